@@ -1,4 +1,4 @@
-//! Lists the files that go into the binary: the shipped models and the page.
+//! Lists the files that go into the binary: the shipped models, the page and the WebXR scene.
 //!
 //! The lists are made here rather than written by hand, so that a model or a
 //! page module is added by putting its file into the folder.
@@ -16,9 +16,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     embed(files(&root.join("../models"), &["onnx", "json", "contact"])?, &out.join("models.rs"))?;
     let endings = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp"];
     let mut page = files(&root.join("web"), &endings)?;
-    // The web client's: the page paints the same pixels.
-    page.push(root.join("../clients/web/src/raster.js").canonicalize()?);
+    // The web client's: the page has its connection, its atlas and its pixels.
+    page.extend(files(&root.join("../clients/web/src"), &["js"])?);
     embed(page, &out.join("page.rs"))?;
+    embed(files(&root.join("web/xr"), &["html", "js", "txt"])?, &out.join("scene.rs"))?;
     Ok(())
 }
 

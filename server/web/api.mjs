@@ -1,6 +1,8 @@
 // The HTTP interface for reading: what openapi.json says, nothing more. Text is only ever set
 // as text, so that nothing the document says can become markup.
 
+import { themeButton } from './theme.mjs';
+
 /** An element with attributes and children; strings become text. */
 function element(name, attributes = {}, ...children) {
   const node = document.createElement(name);
@@ -67,6 +69,7 @@ function show(document_, main) {
   main.replaceChildren(...groups.values());
 }
 
+themeButton(document.getElementById("theme"));
 const about = document.getElementById("about");
 const main = document.getElementById("operations");
 try {

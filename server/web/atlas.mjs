@@ -1,24 +1,14 @@
-// The atlas as flat typed arrays, and the geometry the page needs from it.
+// The atlas of the web client, and the geometry that only a page needs: what lies under a pointer.
 
-import { Patch } from './raster.js';
+import { Atlas as ClientAtlas, vertexNormals } from './atlas.js';
 
 /**
  * Atlas of the finger: both patches share triangles, whose normals point out of the finger; vertex i
  * of one lies over vertex i of the other. x runs along the finger from the tip, the pad faces -z.
  */
-export class Atlas {
+export class Atlas extends ClientAtlas {
   constructor(json) {
-    this.hash = json.hash;
-    this.mmPerPx = json.mm_per_px;
-    this.triangles = Uint32Array.from(json.triangles.flat());
-    this.vertexCount = json.skin.positions_mm.length;
-    this.skin = new Patch(this.triangles, json.skin);
-    this.interface = new Patch(this.triangles, json.interface);
-    /** Unit outward normals of the skin. */
-    this.normals = new Float32Array(3 * this.vertexCount);
-    computeNormals(this.triangles, this.skin.positionsMm, this.normals);
-    /** Skin area that belongs to each vertex, mm2. */
-    this.areasMm2 = vertexAreas(this.triangles, this.skin.positionsMm, this.vertexCount);
+    super(json);
     /** Normals averaged over a few rings: the direction in which an indenter approaches. */
     this.smoothNormals = smooth(this.triangles, this.normals, this.vertexCount, 12);
   }
@@ -80,30 +70,9 @@ export class Atlas {
   }
 }
 
-/** Area-weighted vertex normals of a triangle mesh. */
+/** Unit normals of a mesh that moved, into an array that is there. */
 export function computeNormals(triangles, positions, normals) {
-  normals.fill(0);
-  for (let k = 0; k < triangles.length; k += 3) {
-    const a = 3 * triangles[k];
-    const b = 3 * triangles[k + 1];
-    const c = 3 * triangles[k + 2];
-    const ux = positions[b] - positions[a];
-    const uy = positions[b + 1] - positions[a + 1];
-    const uz = positions[b + 2] - positions[a + 2];
-    const vx = positions[c] - positions[a];
-    const vy = positions[c + 1] - positions[a + 1];
-    const vz = positions[c + 2] - positions[a + 2];
-    const nx = uy * vz - uz * vy;
-    const ny = uz * vx - ux * vz;
-    const nz = ux * vy - uy * vx;
-    for (let corner = 0; corner < 3; corner++) {
-      const i = 3 * triangles[k + corner];
-      normals[i] += nx;
-      normals[i + 1] += ny;
-      normals[i + 2] += nz;
-    }
-  }
-  normalise(normals);
+  normals.set(vertexNormals(triangles, positions));
 }
 
 function normalise(vectors) {
@@ -113,18 +82,6 @@ function normalise(vectors) {
     vectors[i + 1] /= length;
     vectors[i + 2] /= length;
   }
-}
-
-function vertexAreas(triangles, p, vertexCount) {
-  const areas = new Float32Array(vertexCount);
-  for (let k = 0; k < triangles.length; k += 3) {
-    const [a, b, c] = [3 * triangles[k], 3 * triangles[k + 1], 3 * triangles[k + 2]];
-    const u = [p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]];
-    const v = [p[c] - p[a], p[c + 1] - p[a + 1], p[c + 2] - p[a + 2]];
-    const area = 0.5 * Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
-    for (let corner = 0; corner < 3; corner++) areas[triangles[k + corner]] += area / 3;
-  }
-  return areas;
 }
 
 /** `rounds` times the mean over each vertex's neighbours, kept at unit length. */

@@ -86,27 +86,83 @@ export function roundUp(value) {
   return 10 * power;
 }
 
-/** Upper end of a colour scale: grows at once, shrinks only after the peak stayed low for a while. */
+const HOLD_MS = 2500;
+const STEP_MS = 600;
+
+/**
+ * Upper end of a colour scale: grows at once, and shrinks one round step at a time after everything
+ * stayed low for a while, so that it does not jump from frame to frame. `locked` it stays.
+ */
 export class AutoRange {
-  constructor(least, holdMs = 1200) {
+  constructor(least, holdMs = HOLD_MS, stepMs = STEP_MS) {
     this.least = least;
     this.holdMs = holdMs;
+    this.stepMs = stepMs;
     this.max = least;
-    this.lowSinceMs = 0;
+    this.locked = false;
+    this.shrinksAtMs = Infinity;
   }
 
-  /** Takes a new peak; true when the scale changed. */
-  update(peak, nowMs) {
-    const wanted = Math.max(this.least, roundUp(peak));
+  /** Takes what is to be shown; true when the scale changed. */
+  update(most, nowMs) {
+    if (this.locked) return false;
+    const wanted = Math.max(this.least, roundUp(most));
+    if (wanted > this.max) {
+      this.max = wanted;
+      this.shrinksAtMs = Infinity;
+      return true;
+    }
     if (wanted === this.max) {
-      this.lowSinceMs = nowMs;
+      this.shrinksAtMs = Infinity;
       return false;
     }
-    if (wanted < this.max && nowMs - this.lowSinceMs < this.holdMs) return false;
-    this.max = wanted;
-    this.lowSinceMs = nowMs;
+    if (this.shrinksAtMs === Infinity) this.shrinksAtMs = nowMs + this.holdMs;
+    if (nowMs < this.shrinksAtMs) return false;
+    this.max = Math.max(wanted, roundDown(this.max));
+    this.shrinksAtMs = nowMs + this.stepMs;
     return true;
   }
+}
+
+/** The greatest 'round' number below `value`. */
+export function roundDown(value) {
+  const power = 10 ** Math.floor(Math.log10(value) + 1e-9);
+  for (const step of [...ROUND_STEPS].reverse()) if (step * power < value * (1 - 1e-9)) return step * power;
+  return 0.8 * power;
+}
+
+const BINS = 1024;
+const bins = new Uint32Array(BINS);
+/** What is not even this share of the peak counts as nothing. */
+const TRACE = 0.02;
+
+/**
+ * Value (of magnitude) that the share `part` of the pixels with any value does not exceed, to 1/1024
+ * of the peak; 0 where all are 0. One bright line at the edge of a map does not move it.
+ */
+export function percentile(values, pixels, peak, part) {
+  if (!(peak > 0)) return 0;
+  bins.fill(0);
+  let count = 0;
+  for (let n = 0; n < pixels.length; n++) {
+    const v = Math.abs(values[pixels[n]]);
+    if (!(v > TRACE * peak)) continue;
+    bins[Math.min(BINS - 1, Math.floor((v / peak) * BINS))]++;
+    count++;
+  }
+  let left = Math.floor((1 - part) * count);
+  for (let bin = BINS - 1; bin >= 0; bin--) {
+    left -= bins[bin];
+    if (left < 0) return (peak * (bin + 1)) / BINS;
+  }
+  return peak;
+}
+
+/** Root of the mean square over the pixels. */
+export function rms(values, pixels) {
+  let sum = 0;
+  for (let n = 0; n < pixels.length; n++) sum += values[pixels[n]] ** 2;
+  return Math.sqrt(sum / Math.max(1, pixels.length));
 }
 
 const PLAIN = [1, ''];

@@ -1,25 +1,16 @@
 // The press as a contact solve of the server's: the indenter is announced once, then its pose goes
 // out with every frame, and the pressure that was found and what pushes back come in.
 
-const PLATE_MM = { size: 20, edge: 0.5, halfHeight: 2.5 };
-const BAR_MM = { length: 20, end: 0.5 };
 /** Hellos are rare: a slider that moves announces at most so often. */
 const ANNOUNCE_MS = 300;
 /** A lifted indenter stands so far off: at depth 0 it would still graze the skin. */
 const LIFTED_MM = 0.1;
 
-/** The shape of a press as a scene file has it; it presses towards +z of its own frame. */
-export function shapeOf({ shape, radiusMm }) {
-  if (shape === 'plate') return { shape: 'plate', size_mm: [PLATE_MM.size, PLATE_MM.size], edge_radius_mm: PLATE_MM.edge };
-  if (shape === 'sphere') return { shape: 'sphere', radius_mm: radiusMm };
-  return { shape: 'cylinder', radius_mm: radiusMm, length_mm: BAR_MM.length, end_radius_mm: BAR_MM.end };
-}
-
 /** Origin (mm) and unit quaternion x y z w of a press so deep in the finger's frame, into seven numbers. */
 export function poseOf(press, depthMm, out) {
   const { pointMm, normal: n, tangent: t, bitangent: b, heightMm } = press;
   // Its lowest point stands at `heightMm` over the skin; its z goes into the finger, so its y is -b.
-  const reachMm = (press.shape === 'plate' ? PLATE_MM.halfHeight : press.radiusMm) + (depthMm > 0 ? 0 : LIFTED_MM);
+  const reachMm = press.body.faceMm + (depthMm > 0 ? 0 : LIFTED_MM);
   for (let k = 0; k < 3; k++) out[k] = pointMm[k] + (heightMm + reachMm) * n[k];
   quaternionOf(t, b, n, out);
 }
@@ -49,21 +40,30 @@ export function readTouch(v) {
 export class Contact {
   constructor(press) {
     this.press = press;
+    /** Coulomb's coefficient; 0: the object has none, and nothing of friction is computed. */
+    this.friction = 0;
+    /** The contact method asked for; '' leaves it to the server. */
+    this.method = '';
     this.announcedAtMs = -Infinity;
-    this.announced = '';
+    this.announced = null;
   }
 
   /** Members of the hello that announces the press as it is. */
   hello(nowMs) {
-    const shape = shapeOf(this.press);
-    this.announced = JSON.stringify(shape);
+    this.announced = this.press.body;
     this.announcedAtMs = nowMs;
-    return { input: 'objects', objects: [{ shape }], pressure: 'map' };
+    return this.terms(this.method);
+  }
+
+  /** The same for a session that finds the pressure by another method. */
+  terms(method) {
+    const object = { shape: this.press.body.hello, ...(this.friction > 0 && { friction: this.friction }) };
+    return { input: 'objects', objects: [object], pressure: 'map', ...(method && { method }) };
   }
 
   /** Whether the indenter is another than the announced one. */
   get isOther() {
-    return JSON.stringify(shapeOf(this.press)) !== this.announced;
+    return this.press.body !== this.announced;
   }
 
   /** Whether it is time to announce it. */

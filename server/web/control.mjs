@@ -1,5 +1,7 @@
 // Mouse, touch, wheel, keyboard and sliders: where the indenter stands and how deep it goes.
 
+import { SHAPES } from './shapes.mjs';
+
 const RAMP_MM_PER_S = 5;
 const LIFT_MM_PER_S = 14;
 const WHEEL_MM_PER_PX = 0.0008;
@@ -9,6 +11,10 @@ const SIDEWAYS_PX = 8;
 const TURN_RAD_PER_PX = 0.008;
 const TURN_RAD_PER_KEY = 0.12;
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+/** How far to either side an indenter slides, mm. */
+const SLIDE_MM = 3;
+const rad = (input) => (Number(input.value) * Math.PI) / 180;
 
 const byId = (id) => document.getElementById(id);
 
@@ -30,7 +36,13 @@ export class PressControl {
     this.last = { x: 0, y: 0 };
     this.hit = { triangle: 0, weightB: 0, weightC: 0 };
     this.instant = matchMedia('(prefers-reduced-motion: reduce)');
-    this.inputs = { depth: byId('depth'), radius: byId('radius'), angle: byId('angle'), keep: byId('keep') };
+    this.inputs = Object.fromEntries(['depth', 'size', 'angle', 'tilt', 'roll', 'slide', 'keep'].map((name) => [name, byId(name)]));
+    /** Size of each shape as it was last chosen, mm. */
+    this.sizes = Object.fromEntries(Object.entries(SHAPES).map(([name, { size }]) => [name, size?.[3] ?? 0]));
+    /** The visitor's own mesh, if one was dropped. */
+    this.mesh = undefined;
+    this.slidS = 0;
+    this.#listShapes();
     this.#listenToForm();
     this.#listenToPad(pad.overlay);
     this.#centre();
@@ -53,9 +65,20 @@ export class PressControl {
       this.depthMm = Math.abs(goal - this.depthMm) <= move ? goal : this.depthMm + Math.sign(goal - this.depthMm) * move;
       this.changed = true;
     }
+    this.#slide(seconds);
     const changed = this.changed;
     this.changed = false;
     return changed;
+  }
+
+  /** To and fro at a constant speed, from the middle. */
+  #slide(seconds) {
+    const speed = Number(this.inputs.slide.value);
+    if (speed === 0 && this.press.slidMm === 0) return;
+    this.slidS = speed > 0 ? this.slidS + seconds * speed : 0;
+    const along = this.slidS % (4 * SLIDE_MM);
+    this.press.slideTo(along < SLIDE_MM ? along : along < 3 * SLIDE_MM ? 2 * SLIDE_MM - along : along - 4 * SLIDE_MM);
+    this.changed = true;
   }
 
   #centre() {
@@ -68,30 +91,92 @@ export class PressControl {
     this.press.moveToPixel((2 * u) / uvPx.length, (2 * v) / uvPx.length);
   }
 
+  #listShapes() {
+    byId('shapes').append(...Object.entries(SHAPES).map(([name, { label }]) => {
+      const chip = document.createElement('label');
+      const input = Object.assign(document.createElement('input'), { type: 'radio', name: 'shape', value: name, checked: name === this.press.shape });
+      const text = document.createElement('span');
+      text.textContent = label;
+      chip.append(input, text);
+      return chip;
+    }));
+  }
+
+  get shape() {
+    return document.querySelector('input[name=shape]:checked').value;
+  }
+
+  /** Writes what the sliders say, and gives the press its shape. */
+  #reshape() {
+    const { shape, inputs, sizes } = this;
+    const { size, turns } = SHAPES[shape];
+    byId('size-row').hidden = size === null;
+    byId('angle-row').hidden = !turns;
+    if (size && byId('size').dataset.shape !== shape) {
+      inputs.size.dataset.shape = shape;
+      [byId('size-name').textContent, inputs.size.min, inputs.size.max] = size;
+      inputs.size.value = String(sizes[shape]);
+    }
+    if (size) sizes[shape] = Number(inputs.size.value);
+    this.press.setShape(shape, sizes[shape], turns ? rad(inputs.angle) : 0, [rad(inputs.tilt), rad(inputs.roll)], this.mesh);
+    this.changed = true;
+    this.#write();
+  }
+
+  #write() {
+    const { depth, size, angle, tilt, roll, slide } = this.inputs;
+    byId('depth-out').textContent = `${Number(depth.value).toFixed(2)} mm`;
+    byId('size-out').textContent = `${Number(size.value).toFixed(2)} mm`;
+    byId('angle-out').textContent = `${angle.value}°`;
+    byId('tilt-out').textContent = `${tilt.value}°`;
+    byId('roll-out').textContent = `${roll.value}°`;
+    byId('slide-out').textContent = Number(slide.value) > 0 ? `${slide.value} mm/s` : 'off';
+  }
+
+  /** Presses with the visitor's own mesh from now on. */
+  takeMesh(mesh, sizeMm) {
+    this.mesh = mesh;
+    this.sizes.mesh = sizeMm;
+    document.querySelector('input[name=shape][value=mesh]').checked = true;
+    delete this.inputs.size.dataset.shape;
+    this.#reshape();
+  }
+
+  /** What stands in the form, for a link; and the form as a link has it. */
+  get state() {
+    const { depth, angle, tilt, roll, slide } = this.inputs;
+    const [u, v] = this.press.uvPx;
+    return { shape: this.shape, size: this.sizes[this.shape], depth: depth.value, angle: angle.value, tilt: tilt.value, roll: roll.value, slide: slide.value, u: u.toFixed(1), v: v.toFixed(1) };
+  }
+
+  set state(state) {
+    const chip = state.shape in SHAPES ? document.querySelector(`input[name=shape][value=${state.shape}]`) : null;
+    if (chip) {
+      chip.checked = true;
+      const size = Number(state.size);
+      if (size > 0) this.sizes[state.shape] = size;
+      delete this.inputs.size.dataset.shape;
+    }
+    for (const name of ['depth', 'angle', 'tilt', 'roll', 'slide']) {
+      const value = Number(state[name] ?? NaN);
+      if (Number.isFinite(value)) this.inputs[name].value = String(value);
+    }
+    const [u, v] = [Number(state.u ?? NaN), Number(state.v ?? NaN)];
+    if (Number.isFinite(u) && Number.isFinite(v)) this.press.moveToPixel(u, v);
+    this.#reshape();
+  }
+
   #listenToForm() {
-    const { depth, radius, angle, keep } = this.inputs;
-    const show = () => {
-      byId('depth-out').textContent = `${Number(depth.value).toFixed(2)} mm`;
-      byId('radius-out').textContent = `${Number(radius.value).toFixed(1)} mm`;
-      byId('angle-out').textContent = `${angle.value}°`;
-    };
-    const reshape = () => {
-      const shape = document.querySelector('input[name=shape]:checked').value;
-      byId('radius-row').hidden = shape === 'plate';
-      byId('angle-row').hidden = shape !== 'edge';
-      this.press.setShape(shape, Number(radius.value), shape === 'edge' ? (Number(angle.value) * Math.PI) / 180 : 0);
-      this.changed = true;
-      show();
-    };
-    for (const input of document.querySelectorAll('input[name=shape]')) input.addEventListener('change', reshape);
-    radius.addEventListener('input', reshape);
-    angle.addEventListener('input', reshape);
+    const { depth, size, angle, tilt, roll, slide, keep } = this.inputs;
+    for (const input of document.querySelectorAll('input[name=shape]')) input.addEventListener('change', () => this.#reshape());
+    for (const input of [size, angle, tilt, roll]) input.addEventListener('input', () => this.#reshape());
+    slide.addEventListener('input', () => this.#write());
     depth.addEventListener('input', () => {
       this.down = true;
-      show();
+      this.#write();
     });
     keep.addEventListener('change', () => { this.down = keep.checked; });
-    reshape();
+    this.#reshape();
   }
 
   #changeDepth(byMm) {

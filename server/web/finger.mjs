@@ -1,17 +1,20 @@
-// The 3-D finger: the atlas's skin patch, painted with the SED beneath it, flattened where the
-// indenter stands, and turned by dragging. Drawn only when something changed.
+// The 3-D finger: the atlas's skin patch, painted with the SED beneath it and flattened where the
+// indenter stands, on a closed body with a nail; turned by dragging. Drawn only when something changed.
 
 import { MAP_LEN, SIDE_PX } from './protocol.mjs';
 import { TABLES, TABLE_LEN } from './colour.mjs';
 import { computeNormals } from './atlas.mjs';
+import { bodyMesh, nailMesh } from './body.mjs';
 import { fringeOf } from './mask.mjs';
 import { arrowMesh, indenterMesh } from './indenter.mjs';
-import { ARROW_FRAGMENT, GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
+import { onTheme } from './theme.mjs';
+import { ARROW_FRAGMENT, BODY_FRAGMENT, BODY_VERTEX, GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
 
 const FIELD_OF_VIEW_RAD = 0.5;
 const PITCH_LIMIT_RAD = 1.5;
 // The glass stands this far off the skin: coplanar faces would flicker.
 const GLASS_OFFSET_MM = 0.06;
+const NAIL_GLOSS = 0.35;
 const UNIT = { sed: 0, table: 1 };
 /** A force's arrow: so long a newton, at most so long, and none below so much. */
 const ARROW = { mmPerN: 12, mostMm: 30, leastN: 0.005 };
@@ -32,6 +35,7 @@ export class FingerView {
     this.sed = new Float32Array(MAP_LEN);
     this.sedMax = 1;
     this.decades = 0;
+    this.floor = 0;
     this.press = null;
     /** What pushes back; null: nothing is drawn. */
     this.force = null;
@@ -51,17 +55,18 @@ export class FingerView {
     canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
     canvas.addEventListener('webglcontextrestored', () => this.#build());
     new ResizeObserver(() => { this.dirty = true; }).observe(canvas);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.#readTheme());
+    onTheme(() => this.#readTheme());
   }
 
-  /** Shows this map (J/m3) on a scale that ends at `max`; `decades` > 0 makes it logarithmic. */
-  setSed(values, max, decades) {
+  /** Shows this map (J/m3) on a scale that ends at `max`; `decades` > 0 makes it logarithmic; below `floor` skin stays bare. */
+  setSed(values, max, decades, floor) {
     const { gl, sed, fringe } = this;
     const { pixels } = this.atlas.interface.raster;
     for (let n = 0; n < pixels.length; n++) sed[pixels[n]] = Math.min(TEXTURE_MAX, values[pixels[n]]);
     for (let n = 0; n < fringe.length; n += 2) sed[fringe[n]] = sed[fringe[n + 1]];
     this.sedMax = max;
     this.decades = decades;
+    this.floor = floor;
     gl.activeTexture(gl.TEXTURE0 + UNIT.sed);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, sed);
     this.dirty = true;
@@ -142,6 +147,7 @@ export class FingerView {
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
+    this.#drawBody();
     this.#drawSkin();
     if (this.force) this.#drawForce();
     if (this.press) this.#drawIndenter();
@@ -154,9 +160,23 @@ export class FingerView {
     gl.uniformMatrix4fv(skin.uniforms.u_projection, false, this.projection);
     gl.uniform1f(skin.uniforms.u_max, this.sedMax);
     gl.uniform1f(skin.uniforms.u_decades, this.decades);
+    gl.uniform1f(skin.uniforms.u_floor, this.floor);
     gl.uniform3fv(skin.uniforms.u_clay, this.clay);
     gl.bindVertexArray(this.skinArray);
     gl.drawElements(gl.TRIANGLES, this.atlas.triangles.length, gl.UNSIGNED_INT, 0);
+  }
+
+  #drawBody() {
+    const { gl, body } = this;
+    gl.useProgram(body.handle);
+    gl.uniformMatrix4fv(body.uniforms.u_view, false, this.view);
+    gl.uniformMatrix4fv(body.uniforms.u_projection, false, this.projection);
+    for (const [tint, gloss, array, count] of [[this.clay, 0, this.bodyArray, this.bodyCount], [this.nailTint, NAIL_GLOSS, this.nailArray, this.nailCount]]) {
+      gl.uniform3fv(body.uniforms.u_tint, tint);
+      gl.uniform1f(body.uniforms.u_gloss, gloss);
+      gl.bindVertexArray(array);
+      gl.drawArrays(gl.TRIANGLES, 0, count);
+    }
   }
 
   #drawForce() {
@@ -206,10 +226,9 @@ export class FingerView {
   }
 
   #updateIndenter(press) {
-    const key = `${press.shape} ${press.radiusMm}`;
-    if (key === this.glassKey) return;
-    this.glassKey = key;
-    const mesh = indenterMesh(press.shape, press.radiusMm);
+    if (press.body === this.glassBody) return;
+    this.glassBody = press.body;
+    const mesh = indenterMesh(press);
     this.glassCount = mesh.length / 6;
     this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffers.glass);
     this.gl.bufferData(this.gl.ARRAY_BUFFER, mesh, this.gl.STATIC_DRAW);
@@ -274,12 +293,14 @@ export class FingerView {
     this.clay = rgb('--clay');
     this.glassTint = rgb('--glass');
     this.forceTint = rgb('--force');
+    this.nailTint = rgb('--nail');
     this.dirty = true;
   }
 
   #build() {
     const { gl, atlas } = this;
     this.skin = program(gl, SKIN_VERTEX, SKIN_FRAGMENT);
+    this.body = program(gl, BODY_VERTEX, BODY_FRAGMENT);
     this.glass = program(gl, GLASS_VERTEX, GLASS_FRAGMENT);
     this.arrow = program(gl, GLASS_VERTEX, ARROW_FRAGMENT);
     this.buffers = {};
@@ -307,8 +328,16 @@ export class FingerView {
     buffer('glass', new Float32Array(6), gl.STATIC_DRAW);
     attribute(0, 3, 24);
     attribute(1, 3, 24, 12);
-    this.glassKey = '';
+    this.glassBody = null;
     this.glassCount = 0;
+    for (const [name, mesh] of [['body', bodyMesh(atlas)], ['nail', nailMesh()]]) {
+      this[`${name}Count`] = mesh.length / 6;
+      this[`${name}Array`] = gl.createVertexArray();
+      gl.bindVertexArray(this[`${name}Array`]);
+      buffer(name, mesh, gl.STATIC_DRAW);
+      attribute(0, 3, 24);
+      attribute(1, 3, 24, 12);
+    }
     const arrow = arrowMesh();
     this.arrowCount = arrow.length / 6;
     this.arrowArray = gl.createVertexArray();

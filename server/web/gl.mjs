@@ -65,6 +65,7 @@ uniform highp sampler2D u_sed;
 uniform sampler2D u_table;
 uniform float u_max;
 uniform float u_decades;
+uniform float u_floor;
 uniform vec3 u_clay;
 in vec3 v_view;
 in vec3 v_normal;
@@ -72,22 +73,55 @@ in vec2 v_uv;
 out vec4 colour;
 
 void main() {
-  float t = texture(u_sed, v_uv / 224.0).r / u_max;
+  float value = texture(u_sed, v_uv / 224.0).r;
+  float t = value / u_max;
   if (u_decades > 0.0) t = t > 0.0 ? 1.0 + log2(t) / (3.321928 * u_decades) : 0.0;
   t = clamp(t, 0.0, 1.0);
   vec3 painted = texture(u_table, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
-  float paint = smoothstep(0.0, 0.1, t);
+  float paint = value > u_floor ? clamp(t / 0.12, 0.0, 1.0) : 0.0;
   vec3 n = normalize(v_normal);
   vec3 eye = normalize(-v_view);
-  bool inside = !gl_FrontFacing;
-  if (inside) n = -n;
+  // Seen from behind, as where the patch ends, it is skin as well.
+  if (!gl_FrontFacing) n = -n;
   float key = 0.5 + 0.5 * dot(n, normalize(vec3(-0.35, 0.55, 0.75)));
   float light = 0.38 + 0.62 * key * key;
   float gloss = 0.10 * pow(max(dot(n, normalize(eye + vec3(-0.35, 0.55, 0.75))), 0.0), 30.0);
   float rim = 0.14 * pow(1.0 - abs(dot(n, eye)), 3.0);
   // Painted skin is shaded less: its colour is a value to be read off the scale.
   vec3 lit = mix(u_clay * light, painted * (0.72 + 0.28 * light), paint) + gloss + rim * u_clay;
-  colour = vec4(inside ? u_clay * 0.32 * light : lit, 1.0);
+  colour = vec4(lit, 1.0);
+}`;
+
+// The rest of the finger, lit like the skin, and its nail, which shines.
+export const BODY_VERTEX = `#version 300 es
+layout(location = 0) in vec3 a_position;
+layout(location = 1) in vec3 a_normal;
+${CAMERA}
+out vec3 v_view;
+out vec3 v_normal;
+void main() {
+  vec4 p = u_view * vec4(a_position, 1.0);
+  v_view = p.xyz;
+  v_normal = mat3(u_view) * a_normal;
+  gl_Position = u_projection * p;
+}`;
+
+export const BODY_FRAGMENT = `#version 300 es
+precision highp float;
+uniform vec3 u_tint;
+uniform float u_gloss;
+in vec3 v_view;
+in vec3 v_normal;
+out vec4 colour;
+void main() {
+  vec3 n = normalize(v_normal);
+  vec3 eye = normalize(-v_view);
+  if (dot(n, eye) < 0.0) n = -n;
+  float key = 0.5 + 0.5 * dot(n, normalize(vec3(-0.35, 0.55, 0.75)));
+  float light = 0.38 + 0.62 * key * key;
+  float gloss = (0.10 + u_gloss) * pow(max(dot(n, normalize(eye + vec3(-0.35, 0.55, 0.75))), 0.0), 30.0);
+  float rim = 0.14 * pow(1.0 - abs(dot(n, eye)), 3.0);
+  colour = vec4(u_tint * light + gloss + rim * u_tint, 1.0);
 }`;
 
 export const GLASS_VERTEX = `#version 300 es

@@ -1,18 +1,21 @@
 // Meshes of the indenters, in their own frame: x along the first tangent, y along the second, z out
 // of the finger; the lowest point at the origin; mm. And of the arrow that shows a force.
 
+import { surfaceMesh } from './shapes.mjs';
+
 const PLATE_MM = { half: 10, thick: 1.2 };
 const BAR_HALF_MM = 10;
 const ROUND = 48;
 /** Radii of an arrow, and where its head begins: shares of its length. */
 const ARROW = { shaftMm: 0.45, headMm: 1.1, head: 0.35 };
 
-/** Interleaved positions and normals (6 floats a vertex), plain triangles. */
-export function indenterMesh(shape, radiusMm) {
+/** Interleaved positions and normals (6 floats a vertex), plain triangles, of a press's indenter. */
+export function indenterMesh({ shape, sizeMm, body }) {
   const vertices = [];
   if (shape === 'plate') box(vertices);
-  else if (shape === 'sphere') sphere(vertices, radiusMm);
-  else bar(vertices, radiusMm);
+  else if (shape === 'sphere') sphere(vertices, sizeMm);
+  else if (shape === 'cylinder') bar(vertices, sizeMm);
+  else return surfaceMesh(body);
   return Float32Array.from(vertices);
 }
 

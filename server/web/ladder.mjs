@@ -2,6 +2,7 @@
 // Times of rungs that this server serves are its own calibration, the others' are those shipped.
 
 import { fetchJson } from './replay.mjs';
+import { aboutMethod, aboutSet, aboutTier, nameOfMethod, nameOfSet, nameOfTier } from './words.mjs';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const MARGIN = { left: 52, right: 14, top: 12, bottom: 38 };
@@ -10,7 +11,7 @@ const DOT_PX = 5;
 /** Least distance of two numbers on the time axis. */
 const TICK_PX = 46;
 const KINDS = {
-  closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'published U-Net', fe: 'finite elements',
+  closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'published U-Net', fe: 'FE',
 };
 
 const byId = (id) => document.getElementById(id);
@@ -49,8 +50,9 @@ export function rungsOn(data, set) {
   }
   const drawn = rungs.filter(({ timeMs, error }) => timeMs > 0 && error > 0);
   const beats = (a, b) => a.timeMs <= b.timeMs && a.error <= b.error && (a.timeMs < b.timeMs || a.error < b.error);
+  const served = drawn.filter((rung) => rung.tier !== null);
   return drawn
-    .map((rung) => ({ ...rung, onFront: !drawn.some((other) => beats(other, rung)) }))
+    .map((rung) => ({ ...rung, onFront: !drawn.some((other) => beats(other, rung)), onServedFront: rung.tier !== null && !served.some((other) => beats(other, rung)) }))
     .sort((a, b) => a.timeMs - b.timeMs);
 }
 
@@ -91,24 +93,52 @@ export function placeName(taken, x, y, width, right) {
 }
 
 const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
+const least = (among, key) => among.reduce((a, b) => (a === undefined || b[key] < a[key] ? b : a), undefined);
 
-/** The tier to advise where `late` misses its budget: of the faster ones that meet it the most accurate, or else the fastest. */
-export function adviseTier(tiers, late, budgetMs) {
-  const leastUs = tiers.find(({ name }) => name === late)?.predicted_latency_us ?? Infinity;
-  const faster = tiers.filter((tier) => !tier.for_comparison && tier.predicted_latency_us < leastUs);
-  const meeting = faster.filter((tier) => tier.predicted_latency_us <= 1000 * budgetMs);
-  const least = (among, key) => among.reduce((a, b) => (a[key] <= b[key] ? a : b), among[0])?.name;
-  return least(meeting, 'relative_l2_median') ?? least(faster, 'predicted_latency_us');
+/** Ways to answer a frame, each with its time, ms: every network, with every contact method where frames are poses. */
+function waysOf({ tiers, methods }, isContact) {
+  const networks = tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form');
+  const contacts = isContact && methods ? methods : [null];
+  return networks.flatMap((tier) => contacts.map((method) => ({
+    tier: tier.name, error: tier.relative_l2_median, method: method?.name ?? null, ms: (tier.predicted_latency_us + (method?.contact_us ?? 0)) / 1000,
+    contactError: method?.errors?.[0]?.pressure_relative_l2.median ?? 0,
+  })));
 }
 
-/** What the server says of its tiers; they go into the choice beside `by budget`. */
+/**
+ * What to do where frames are late, or in words that nothing is that fast: the most accurate way within
+ * the budget, of networks alone, since a closed form is another thing than a fast network.
+ */
+export function adviseTier(listing, { tier, method, budgetMs, isContact }) {
+  const ways = waysOf(listing, isContact);
+  if (ways.length === 0) return { text: 'raise the budget' };
+  const meeting = ways.filter((way) => way.ms <= budgetMs && (way.tier !== tier || (isContact && way.method !== method)));
+  const said = (way) => `${nameOfTier(way.tier)}${way.method && way.method !== method ? ` with contact ${nameOfMethod(way.method)}` : ''}`;
+  const best = least(meeting.map((way) => ({ ...way, sum: Math.hypot(way.error, way.contactError) })), 'sum');
+  if (best) return { text: `raise the budget or take ${said(best)}`, tier: best.tier, method: best.method };
+  const fastest = least(ways, 'ms');
+  return { text: `no model is that fast here; the fastest, ${said(fastest)}, takes some ${short(fastest.ms)} ms`, tier: fastest.tier, method: fastest.method };
+}
+
+/** What the server says of its tiers; they go into the choices. */
 export async function listTiers() {
   const listing = await fetchJson('v1/tiers');
-  byId('tier').append(...listing.tiers.map((tier) => {
+  const options = listing.tiers.map((tier) => {
     const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
     const error = tier.relative_l2_median > 0 ? `, ${oneDigit(100 * tier.relative_l2_median)} % off` : '';
-    return new Option(`${tier.name} (${ms}${error})`, tier.name);
-  }));
+    const option = new Option(`${nameOfTier(tier.name)} (${ms}${error})`, tier.name);
+    option.title = aboutTier(tier.name);
+    return option;
+  });
+  byId('tier').append(...options);
+  byId('with').append(...listing.tiers.map((tier) => new Option(nameOfTier(tier.name), `tier:${tier.name}`)));
+  for (const method of listing.methods ?? []) {
+    const name = nameOfMethod(method.name);
+    const option = new Option(`${name} (${oneDigit(method.contact_us / 1000)} ms)`, method.name);
+    option.title = aboutMethod(method.name);
+    byId('method').append(option);
+    byId('with').append(new Option(`contact ${name}`, `method:${method.name}`));
+  }
   return listing;
 }
 
@@ -131,12 +161,34 @@ export class LadderView {
     this.ready = null;
     this.budgetMs = NaN;
     this.live = null;
-    this.select.replaceChildren(...setsOf(data).map((set) => new Option(set, set)));
+    this.select.replaceChildren(...setsOf(data).map((set) => new Option(nameOfSet(set), set)));
+    // The set of the README's table and of the choices, so that all say the same.
     if (data.judged_on) this.select.value = data.judged_on;
     this.select.addEventListener('change', () => this.draw());
     byId('ladder-machine').textContent = data.ladder ? `Shipped figures: ${data.ladder.machine}.` : '';
     new ResizeObserver(() => this.draw()).observe(this.svg);
+    this.#listen();
     this.draw();
+  }
+
+  /** Dragging goes from one served model to the next, along the line. */
+  #listen() {
+    const { svg } = this;
+    const follow = (event) => {
+      const { left } = svg.getBoundingClientRect();
+      const near = this.rungs.filter((rung) => rung.tier !== null && rung.onServedFront).map((rung) => ({ rung, px: Math.abs(this.x(rung.timeMs) - (event.clientX - left)) }));
+      const nearest = least(near, 'px');
+      if (nearest && nearest.rung.tier !== this.running) {
+        this.running = nearest.rung.tier;
+        this.choose(nearest.rung.tier);
+      }
+    };
+    svg.addEventListener('pointerdown', (event) => {
+      if (event.target.closest('.served') || !this.rungs?.length) return;
+      svg.setPointerCapture(event.pointerId);
+      follow(event);
+    });
+    svg.addEventListener('pointermove', (event) => { if (svg.hasPointerCapture(event.pointerId)) follow(event); });
   }
 
   /** The session has new terms. */
@@ -159,15 +211,25 @@ export class LadderView {
     if (width === 0 || height === 0) return;
     svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
     this.rungs = rungsOn(this.data, this.select.value);
+    byId('ladder-set-about').textContent = `${nameOfSet(this.select.value)}: ${aboutSet(this.data.ladder?.sets, this.select.value)}.`;
     const focused = document.activeElement?.dataset?.tier;
     svg.replaceChildren();
     this.live = null;
     if (this.rungs.length === 0) return;
+    this.#key();
     this.#axes(width, height);
     this.#front();
     this.#dots(width);
     if (focused) svg.querySelector(`[data-tier="${CSS.escape(focused)}"]`)?.focus();
     this.#words(NaN, NaN);
+  }
+
+  /** Names the kinds that this set shows. */
+  #key() {
+    const kinds = new Set(this.rungs.map((rung) => rung.kind));
+    const key = (kind, name) => Object.assign(document.createElement('span'), { className: `key ${kind}`, textContent: name });
+    const shown = Object.entries(KINDS).filter(([kind]) => kinds.has(kind)).map(([kind, name]) => key(kind, name));
+    byId('ladder-key').replaceChildren(...shown, key('now', 'now'));
   }
 
   #axes(width, height) {
@@ -216,7 +278,7 @@ export class LadderView {
     for (const rung of rungs) {
       const [x, y] = [this.x(rung.timeMs), this.y(rung.error)];
       const group = make(svg, 'g', { class: `rung ${rung.kind}` });
-      make(group, 'title', {}, `${rung.name} (${KINDS[rung.kind] ?? rung.kind}): ${showError(rung.error)} in ${showTime(rung.timeMs)}`);
+      make(group, 'title', {}, `${nameOfTier(rung.name)} (${KINDS[rung.kind] ?? rung.kind}): ${showError(rung.error)} in ${showTime(rung.timeMs)}. ${aboutTier(rung.name)}`);
       if (rung.tier) this.#button(group, rung);
       if (rung.tier !== null && rung.tier === this.running) make(group, 'circle', { class: 'ring', cx: x, cy: y, r: DOT_PX + 4 });
       if (rung.kind === 'fe') make(group, 'path', { class: rung.reference ? 'dot hollow' : 'dot', d: `M${x} ${y - 6}l6 6l-6 6l-6 -6z` });
@@ -227,8 +289,8 @@ export class LadderView {
     const weight = (rung) => (rung.tier === null ? 2 : rung.tier === this.running ? 0 : 1);
     for (const rung of [...rungs].sort((a, b) => weight(a) - weight(b))) {
       const boldness = rung.tier !== null && rung.tier === this.running ? 0.62 : 0.56;
-      const place = placeName(taken, this.x(rung.timeMs), this.y(rung.error), rung.name.length * FONT_PX * boldness, width - 2);
-      if (place) make(groups.get(rung), 'text', { x: place[0], y: place[1] + 4 }, rung.name);
+      const place = placeName(taken, this.x(rung.timeMs), this.y(rung.error), nameOfTier(rung.name).length * FONT_PX * boldness, width - 2);
+      if (place) make(groups.get(rung), 'text', { x: place[0], y: place[1] + 4 }, nameOfTier(rung.name));
     }
   }
 
@@ -237,7 +299,7 @@ export class LadderView {
     group.dataset.tier = rung.tier;
     group.setAttribute('role', 'button');
     group.setAttribute('tabindex', '0');
-    group.setAttribute('aria-label', `${rung.name}: ${showError(rung.error)}, ${showTime(rung.timeMs)}`);
+    group.setAttribute('aria-label', `${nameOfTier(rung.name)}: ${showError(rung.error)}, ${showTime(rung.timeMs)}`);
     group.setAttribute('aria-pressed', String(rung.tier === this.running));
     group.addEventListener('click', () => this.choose(rung.tier));
     group.addEventListener('keydown', (event) => {
@@ -265,9 +327,9 @@ export class LadderView {
   #words(serverMs, error) {
     const rung = this.rungs?.find(({ tier }) => tier === this.running);
     const parts = [];
-    if (rung) parts.push(`${rung.name}: ${showError(rung.error)} on ${this.select.value}, ${showTime(rung.timeMs)} in the calibration`);
-    else if (this.running) parts.push(`${this.running}: not on this set`);
-    if (serverMs > 0) parts.push(`now ${showTime(serverMs)} in the server`);
+    if (rung) parts.push(`${nameOfTier(rung.name)}: ${showError(rung.error)} off on ${nameOfSet(this.select.value)}, ${showTime(rung.timeMs)} alone`);
+    else if (this.running) parts.push(`${nameOfTier(this.running)}: not on this set`);
+    if (serverMs > 0) parts.push(`now ${showTime(serverMs)} in the server${this.ready?.method ? ' with contact' : ''}`);
     if (error > 0) parts.push(`${showError(error)} on this frame`);
     if (this.ready?.meets_budget === false) parts.push('not expected to meet the budget');
     const text = parts.join('; ');

@@ -1,53 +1,51 @@
-// A 224 x 224 map as a picture: pixels through a colour table, mask outline and rulers on a second
-// canvas above it, a scale bar below, and the value under the pointer.
+// A 224 x 224 map as a picture: pixels through the colours of its scale, mask outline and ruler on a
+// second canvas above it, and the value under the pointer.
 
 import { MAP_LEN, SIDE_PX } from './protocol.mjs';
-import { AutoRange, TABLE_LEN, TABLES, digits, prefixOf } from './colour.mjs';
+import { TABLE_LEN, digits, percentile } from './colour.mjs';
+import { LOG_DECADES } from './scale.mjs';
+import { onTheme } from './theme.mjs';
 
-/** Decades that the logarithmic scale spans. */
-export const LOG_DECADES = 3;
 const BAR_LENGTHS_MM = [10, 5, 2, 1];
 const TIP = 'tip \u2191';
+/** A scale has to hold this share of the pixels that hold anything: one bright line does not take it. */
+const PART = 0.98;
 
 /** Picture of one quantity; `element` is the <figure> that holds its parts by data-part. */
 export class MapView {
-  /**
-   * `options`: table, unit, least (smallest scale end), signed (scale symmetric about 0), like (a view
-   * whose unit prefix this one shares).
-   */
-  constructor(element, options) {
+  constructor(element, scale) {
     const part = (name) => element.querySelector(`[data-part=${name}]`);
     this.element = element;
-    this.options = options;
+    this.scale = scale;
+    scale.views.push(this);
     this.canvas = part('pixels');
     this.overlay = part('overlay');
-    this.bar = part('bar');
-    this.ticks = part('ticks');
     this.peakText = part('peak');
     this.probeText = part('probe');
     this.ruler = part('ruler');
-    this.unitText = part('unit');
     this.overlayContext = this.overlay.getContext('2d');
     this.theme = { outline: '', muted: '', panel: '' };
     this.context = this.canvas.getContext('2d', { willReadFrequently: true });
     this.image = this.context.createImageData(SIDE_PX, SIDE_PX);
     this.words = new Uint32Array(this.image.data.buffer);
-    this.colours = new Uint32Array(TABLES[options.table].buffer);
     this.values = new Float32Array(MAP_LEN);
-    this.range = new AutoRange(options.least);
-    this.logarithmic = false;
     this.pixels = null;
     this.outline = null;
     this.mmPerPx = 0;
     this.peak = 0;
-    this.peakShown = -1;
+    /** What the scale has to hold. */
+    this.most = 0;
+    this.shown = '';
     this.probe = -1;
     this.marker = null;
-    this.#drawBar();
     this.#listen();
     this.#readTheme();
     new ResizeObserver(() => this.#fit()).observe(this.overlay);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.#readTheme());
+    onTheme(() => this.#readTheme());
+  }
+
+  get isShown() {
+    return this.element.checkVisibility();
   }
 
   /** Binds the view to a patch: only its pixels are painted. */
@@ -59,65 +57,39 @@ export class MapView {
     this.#fit();
   }
 
-  setLogarithmic(on, nowMs) {
-    this.logarithmic = on;
-    this.#drawTicks();
-    this.show(this.values, nowMs, this.range);
-  }
-
-  /** Paints `values`; `range` lets another view's scale be used. Returns the largest magnitude. */
-  show(values, nowMs, range = null) {
-    if (!this.pixels) return 0;
-    if (values !== this.values) this.values.set(values);
+  /** Takes values and paints them, after the scale has been fitted to them. */
+  show(values, nowMs) {
+    if (!this.pixels) return;
+    this.values.set(values);
     this.peak = peakOf(values, this.pixels);
-    if (range) {
-      if (range.max !== this.range.max) {
-        this.range.max = range.max;
-        this.#drawTicks();
-      }
-    } else if (this.range.update(this.peak, nowMs)) {
-      this.#drawTicks();
-    } else if (this.prefixShown !== this.#prefix()[1]) {
-      this.#drawTicks();
-    }
-    this.#paint();
-    this.context.putImageData(this.image, 0, 0);
-    this.#showNumbers();
-    return this.peak;
+    this.most = percentile(values, this.pixels, this.peak, PART);
+    if (!this.scale.fit(nowMs)) this.paint();
   }
 
-  /** Lets the scale shrink after a peak has passed; true when it did. To be called while nothing new comes. */
-  settle(nowMs) {
-    if (!this.pixels || !this.range.update(this.peak, nowMs)) return false;
-    this.#drawTicks();
-    this.show(this.values, nowMs, this.range);
-    return true;
-  }
-
-  #paint() {
-    const { pixels, values, words, colours, options } = this;
-    const max = this.range.max;
-    if (options.signed) {
+  paint() {
+    if (!this.pixels) return;
+    const { pixels, values, words, scale } = this;
+    const { max, colours, floor, bare } = scale;
+    if (scale.options.signed) {
       const half = (TABLE_LEN - 1) / 2;
       for (let n = 0; n < pixels.length; n++) words[pixels[n]] = colours[index(half + (half * values[pixels[n]]) / max)];
-    } else if (this.logarithmic) {
+    } else if (scale.logarithmic) {
       const slope = (TABLE_LEN - 1) / LOG_DECADES;
       for (let n = 0; n < pixels.length; n++) {
         const v = values[pixels[n]];
-        words[pixels[n]] = colours[v > 0 ? index((Math.log10(v / max) + LOG_DECADES) * slope) : 0];
+        words[pixels[n]] = v > floor ? colours[index((Math.log10(v / max) + LOG_DECADES) * slope)] : bare;
       }
     } else {
       const slope = (TABLE_LEN - 1) / max;
-      for (let n = 0; n < pixels.length; n++) words[pixels[n]] = colours[index(slope * values[pixels[n]])];
+      for (let n = 0; n < pixels.length; n++) {
+        const v = values[pixels[n]];
+        words[pixels[n]] = v > floor ? colours[index(slope * v)] : bare;
+      }
     }
-  }
-
-  #showNumbers() {
+    this.context.putImageData(this.image, 0, 0);
     // Text is laid out afresh whenever it changes: only when the shown digits would differ.
-    if (Math.abs(this.peak - this.peakShown) > 1e-3 * this.peak || (this.peak === 0 && this.peakShown !== 0)) {
-      this.peakText.textContent = this.#quantity(this.peak);
-      this.peakShown = this.peak;
-    }
+    const text = this.#quantity(this.peak);
+    if (text !== this.shown) this.peakText.textContent = this.shown = text;
     this.#showProbe();
   }
 
@@ -128,12 +100,8 @@ export class MapView {
 
   /** Value in the unit of the scale. */
   #quantity(value) {
-    const [size, prefix] = this.#prefix();
-    return `${digits(value / size)} ${prefix}${this.options.unit}`;
-  }
-
-  #prefix() {
-    return prefixOf((this.options.like ?? this).range.max, this.options.unit);
+    const [size, prefix] = this.scale.prefix();
+    return `${digits(value / size)} ${prefix}${this.scale.options.unit}`;
   }
 
   #listen() {
@@ -155,39 +123,11 @@ export class MapView {
     return [((event.clientX - box.left) / box.width) * SIDE_PX, ((event.clientY - box.top) / box.height) * SIDE_PX];
   }
 
-  #drawBar() {
-    const context = this.bar.getContext('2d');
-    const image = context.createImageData(TABLE_LEN, 1);
-    image.data.set(TABLES[this.options.table]);
-    this.bar.width = TABLE_LEN;
-    this.bar.height = 1;
-    context.putImageData(image, 0, 0);
-    this.#drawTicks();
-  }
-
-  #drawTicks() {
-    const { max } = this.range;
-    const { signed, unit } = this.options;
-    this.peakShown = -1;
-    const labels = [];
-    if (this.logarithmic) {
-      for (let k = 0; k <= LOG_DECADES; k++) labels.push(max * 10 ** (k - LOG_DECADES));
-    } else {
-      for (let k = 0; k <= 4; k++) labels.push(signed ? (max * (k - 2)) / 2 : (max * k) / 4);
-    }
-    const [size, prefix] = this.#prefix();
-    this.prefixShown = prefix;
-    this.ticks.replaceChildren(...labels.map((value) => {
-      const tick = document.createElement('span');
-      tick.textContent = trim(value / size);
-      return tick;
-    }));
-    this.unitText.textContent = `${prefix}${unit}`;
-  }
-
-  /** Marks the press: `marker` = [u, v] in pixels, or null. */
-  setMarker(marker) {
-    this.marker = marker;
+  /** Shows where the indenter stands, in pixel coordinates; null hides it. */
+  setMarker(uvPx) {
+    const same = uvPx === null ? this.marker === null : this.marker && this.marker[0] === uvPx[0] && this.marker[1] === uvPx[1];
+    if (same) return;
+    this.marker = uvPx ? [uvPx[0], uvPx[1]] : null;
     this.drawOverlay();
   }
 
@@ -199,10 +139,12 @@ export class MapView {
 
   /** The picture changed its size: overlay and ruler follow. */
   #fit() {
-    const lengthMm = BAR_LENGTHS_MM.find((mm) => mm / this.mmPerPx < SIDE_PX / 4) ?? 1;
-    const bar = document.createElement('i');
-    bar.style.width = `${(lengthMm / this.mmPerPx) * (this.overlay.clientWidth / SIDE_PX)}px`;
-    this.ruler.replaceChildren(bar, `${lengthMm} mm`);
+    if (this.ruler && this.mmPerPx > 0) {
+      const lengthMm = BAR_LENGTHS_MM.find((mm) => mm / this.mmPerPx < SIDE_PX / 4) ?? 1;
+      const bar = document.createElement('i');
+      bar.style.width = `${(lengthMm / this.mmPerPx) * (this.overlay.clientWidth / SIDE_PX)}px`;
+      this.ruler.replaceChildren(bar, `${lengthMm} mm`);
+    }
     this.drawOverlay();
   }
 
@@ -239,8 +181,6 @@ export class MapView {
 }
 
 const index = (x) => (x <= 0 ? 0 : x >= TABLE_LEN - 1 ? TABLE_LEN - 1 : (x + 0.5) | 0);
-
-const trim = (value) => String(Number(value.toPrecision(3)));
 
 function peakOf(values, pixels) {
   let peak = 0;

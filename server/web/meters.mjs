@@ -2,6 +2,7 @@
 // second, so that it can be read and layout stays cheap.
 
 import { Stats, drawStrip } from './stats.mjs';
+import { nameOfSet, nameOfTier } from './words.mjs';
 
 const REFRESH_MS = 250;
 const LATE_TO_TELL = 5;
@@ -28,7 +29,7 @@ function showRow(row) {
 }
 
 export class Meters {
-  /** `advise(tier, budgetMs)`: the tier to take instead, if there is one. */
+  /** `advise(tier, budgetMs)`: in words, what to do where the budget is missed. */
   constructor(advise) {
     this.advise = advise;
     this.stats = new Stats();
@@ -56,8 +57,8 @@ export class Meters {
   /** `medians`: name and median relative L2 of each set that the tier was measured on. */
   ready(ready, medians) {
     this.tier = ready.tier;
-    const each = medians.map(([set, median]) => `${set} ${percent(median)}`);
-    put('error-context', each.length ? `median of this tier: ${each.join(', ')}` : '');
+    const each = medians.map(([set, median]) => `${nameOfSet(set)} ${percent(median)}`);
+    put('error-context', each.length ? `median of this model: ${each.join(', ')}` : '');
   }
 
   /** One row for each shipped press. */
@@ -106,7 +107,10 @@ export class Meters {
     if (nowMs - this.shownAtMs < REFRESH_MS) return false;
     this.shownAtMs = nowMs;
     const { stats, pair } = this;
-    put('tier-name', this.tier);
+    put('tier-name', nameOfTier(this.tier));
+    byId('tier-name').dataset.tier = this.tier;
+    put('sed-of', nameOfTier(this.tier));
+    put('sed-ms', this.serverMs > 0 ? `${ms(this.serverMs)} ms in the server` : '–');
     put('rate', sending ? `${stats.rate(nowMs)} frames/s` : 'idle');
     for (const [name, ring] of [['trip', stats.roundTripMs], ['server', stats.serverMs]]) {
       ring.percentiles(pair);
@@ -118,9 +122,7 @@ export class Meters {
     const late = stats.lateInARow >= LATE_TO_TELL;
     // An old answer must not pass for the answer to this press.
     byId('sed').classList.toggle('stale', late || !connected);
-    const other = this.advise(this.tier, this.budgetMs);
-    const cure = other ? `raise the budget or take ${other}` : 'raise the budget';
-    put('stale', connected ? `${this.tier} needs more than ${this.budgetMs} ms: ${cure}` : 'no connection');
+    put('stale', connected ? `${nameOfTier(this.tier)} needs more than ${this.budgetMs} ms here: ${this.advise(this.tier, this.budgetMs)}` : 'no connection');
     const top = drawStrip(byId('strip'), stats.roundTripMs, this.budgetMs);
     const budget = `budget ${this.budgetMs} ms`;
     put('strip-top', top >= this.budgetMs ? `line: ${budget}` : `top: ${ms(top)} ms, ${budget}`);

@@ -1,17 +1,27 @@
-// The page: wires atlas, press, session, maps and figures together. One loop, driven by the display.
+// The page: wires atlas, press, sessions, maps and figures together. One loop, driven by the display.
 
 import { Atlas } from './atlas.mjs';
+import { Comparison, relativeL2 } from './compare.mjs';
 import { Contact, poseOf, readTouch } from './contact.mjs';
 import { PressControl } from './control.mjs';
+import { rms } from './colour.mjs';
+import { EffectSwitches } from './effects.mjs';
 import { FingerView } from './finger.mjs';
+import { HardCases } from './hard.mjs';
 import { LadderView, adviseTier, listTiers } from './ladder.mjs';
-import { LOG_DECADES, MapView } from './map.mjs';
+import { MapView } from './map.mjs';
 import { countDifferences } from './mask.mjs';
+import { meshOf } from './mesh.mjs';
 import { Meters } from './meters.mjs';
 import { Press } from './press.mjs';
-import { MAP_LEN, Session } from './protocol.mjs';
+import { MAP_LEN, SIDE_PX, Session, sessionUrl } from './protocol.mjs';
 import { Replay, fetchJson } from './replay.mjs';
+import { LOG_DECADES, Scale } from './scale.mjs';
+import { hashOf, npyOf, pictureOf, pythonOf, save, stateOf } from './share.mjs';
 import { SpikeView } from './spikes.mjs';
+import { themeButton } from './theme.mjs';
+import { Timeline } from './timeline.mjs';
+import { flagsOf, nameOfMethod, nameOfTier } from './words.mjs';
 
 const byId = (id) => document.getElementById(id);
 /** A complaint stays at least this long, then until frames are answered again. */
@@ -19,44 +29,57 @@ const NOTICE_MS = 6000;
 /** A frame is sent so often even if nothing changes, so that a silent server is noticed. */
 const QUIET_MS = 1000;
 const SED_UNIT = 'J/m³';
+/** A dropped file whose size could be a finger's keeps it. */
+const PLAUSIBLE_MM = { least: 3, most: 30 };
+/** What the friction of the switch is, where none was chosen. */
+const FRICTION = 0.5;
 
 class Page {
-  constructor(atlas, listing) {
+  constructor(atlas, listing, effects) {
     this.atlas = atlas;
+    this.listing = listing;
     this.ladder = new LadderView(listing, (tier) => this.#switchTo(tier));
     this.mode = 'press';
     this.press = new Press(atlas);
     /** Null where the server has no contact model: pressure is then this page's estimate. */
     this.contact = listing.methods === null ? null : new Contact(this.press);
     document.body.toggleAttribute('data-contact', this.contact !== null);
+    if (!this.contact) for (const option of [...byId('with').options]) if (option.value.startsWith('method:')) option.remove();
     this.unsent = true;
+    /** Greatest pressure of the training of the tier that runs. */
+    this.mostPa = NaN;
     this.stream = byId('stream');
-    this.log = false;
-    this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN) };
+    /** What is on its way: its kind, pressure (as far as the page knows it), pose, and what was pressed. */
+    this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN), pose: new Float32Array(7), pressed: null };
     this.answered = { sequence: 0, tier: '', pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
-    this.meters = new Meters((tier, budgetMs) => adviseTier(listing.tiers, tier, budgetMs));
+    this.pair = { second: new Float32Array(MAP_LEN), difference: new Float32Array(MAP_LEN), apart: NaN };
+    this.meters = new Meters((tier, budgetMs) => this.#advice(tier, budgetMs).text);
     this.replay = new Replay(atlas);
     this.spikes = new SpikeView();
+    this.timeline = new Timeline();
     this.#makeViews();
     this.control = new PressControl(atlas, this.press, this.views.pressure);
     if (this.finger) this.control.attachFinger(this.finger);
+    this.effects = new EffectSwitches(effects, (name, on) => this.#effect(name, on));
+    this.comparison = new Comparison((first, second, answer) => this.#showPair(first, second, answer), (message) => notify(message));
+    this.hard = new HardCases(atlas, this.contact !== null, () => this.mostPa, () => this.answered.tier || null);
     this.session = this.#makeSession();
     this.#listen();
+    this.#restore();
     this.tick = (nowMs) => this.#frame(nowMs);
   }
 
   #makeViews() {
     const { atlas } = this;
-    const view = (id, options) => new MapView(byId(id), options);
-    this.views = {
-      pressure: view('pressure', { table: 'viridis', unit: 'Pa', least: 1000 }),
-      sed: view('sed', { table: 'inferno', unit: SED_UNIT, least: 1 }),
-      truth: view('truth', { table: 'inferno', unit: SED_UNIT, least: 1 }),
-      difference: view('difference', { table: 'diverging', unit: SED_UNIT, least: 1, signed: true }),
+    this.scales = {
+      pressure: new Scale(byId('pressure-scale'), { table: 'viridis', unit: 'Pa', least: 1000 }),
+      sed: new Scale(byId('sed-scale'), { table: 'inferno', unit: SED_UNIT, least: 1 }),
     };
-    this.views.difference.options.like = this.views.sed;
+    this.scales.difference = new Scale(byId('difference-scale'), { table: 'diverging', unit: SED_UNIT, least: 1, signed: true, like: this.scales.sed });
+    const view = (id, scale) => new MapView(byId(id), this.scales[scale]);
+    this.views = { pressure: view('pressure', 'pressure'), sed: view('sed', 'sed'), other: view('other', 'sed'), difference: view('difference', 'difference') };
     this.views.pressure.setPatch(atlas.skin.raster, atlas.mmPerPx);
-    for (const name of ['sed', 'truth', 'difference']) this.views[name].setPatch(atlas.interface.raster, atlas.mmPerPx);
+    for (const name of ['sed', 'other', 'difference']) this.views[name].setPatch(atlas.interface.raster, atlas.mmPerPx);
     try {
       this.finger = new FingerView(byId('finger'), atlas);
     } catch (error) {
@@ -64,13 +87,12 @@ class Page {
       byId('no-webgl').hidden = false;
       byId('no-webgl').textContent = `The 3-D finger cannot be drawn: ${error.message}. The maps work without it.`;
     }
+    this.scales.sed.onchange = () => this.#paintFinger();
   }
 
   #makeSession() {
-    const url = new URL('v1/session', document.baseURI);
-    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
-    return new Session(url.href, {
-      onstate: (state, detail) => showState(state, detail),
+    return new Session(sessionUrl(), {
+      onstate: (state, detail) => this.#state(state, detail),
       onready: (ready) => this.#ready(ready),
       onanswer: (answer, roundTripMs) => this.#answer(answer, roundTripMs),
       onfault: (code, message) => {
@@ -80,8 +102,19 @@ class Page {
     });
   }
 
+  /** Terms that an effect brought and the server refuses are taken back: the rest goes on. */
+  #state(state, detail) {
+    showState(state, detail);
+    const name = this.effects.last;
+    if (state !== 'refused' || !this.effects.on.has(name)) return;
+    this.effects.set(name, false);
+    this.spikes.toggle(this.effects.on.has('spikes'));
+    this.#open();
+  }
+
   start() {
     this.#open();
+    this.#chooseOther();
     requestAnimationFrame(this.tick);
   }
 
@@ -93,8 +126,12 @@ class Page {
 
   #hello(nowMs) {
     const announced = this.solves ? this.contact.hello(nowMs) : {};
-    const budgetUs = Number(byId('budget').value);
-    this.session.open({ tier: byId('tier').value || null, budget_us: budgetUs, atlas_hash: this.atlas.hash, effects: this.spikes.isOn ? ['spikes'] : [], ...announced });
+    this.session.open({ ...this.#terms(), ...announced });
+  }
+
+  /** What is asked for, whatever the frames are. */
+  #terms() {
+    return { tier: byId('tier').value || null, budget_us: Number(byId('budget').value), atlas_hash: this.atlas.hash, ...this.effects.hello(Array.from(this.press.uvPx)) };
   }
 
   /** Whether the server finds the pressure of this press. */
@@ -104,17 +141,43 @@ class Page {
 
   #switchTo(tier) {
     byId('tier').value = tier;
+    this.effects.forget();
     this.#open();
   }
 
+  #advice(tier, budgetMs) {
+    return adviseTier(this.listing, { tier, method: this.session.ready?.method ?? null, budgetMs, isContact: this.solves });
+  }
+
   #ready(ready) {
+    this.mostPa = ready.pressure_max_pa;
     this.ladder.setReady(ready);
     this.spikes.setUnits(ready.units);
     this.control.changed = true;
     this.unsent = true;
     this.replay.forget();
     this.meters.ready(ready, this.ladder.medians(ready.tier));
+    this.#noteBudget(ready);
     notify('');
+  }
+
+  /** Says plainly where the budget cannot be met, and offers what comes nearest. */
+  #noteBudget(ready) {
+    const note = byId('budget-note');
+    note.replaceChildren();
+    if (ready.method && byId('method').value === '') note.append(`Contact: ${nameOfMethod(ready.method)}. `);
+    if (ready.meets_budget !== false) return;
+    const budgetMs = ready.budget_us / 1000;
+    const advice = this.#advice(ready.tier, budgetMs);
+    note.append(`Not expected within ${budgetMs} ms (${(ready.predicted_latency_us / 1000).toFixed(1)} ms are): ${advice.text}. `);
+    if (!advice.tier || (advice.tier === ready.tier && (advice.method ?? ready.method) === ready.method)) return;
+    const button = Object.assign(document.createElement('button'), { type: 'button', className: 'quiet', textContent: `Take ${nameOfTier(advice.tier)}` });
+    button.addEventListener('click', () => {
+      if (advice.method) byId('method').value = advice.method;
+      if (this.contact) this.contact.method = byId('method').value;
+      this.#switchTo(advice.tier);
+    });
+    note.append(button);
   }
 
   #answer(answer, roundTripMs) {
@@ -124,27 +187,29 @@ class Page {
       this.unsent = true;
       return;
     }
+    if (document.body.dataset.live === undefined) {
+      document.body.dataset.live = '';
+      this.hard.begin();
+    }
     if (nowMs - noticedAtMs > NOTICE_MS) notify('');
     this.#followTier(answer.tierNumber);
-    showFlags(answer, this.session.ready?.pressure_max_pa);
-    if (answer.touch) this.#showTouch(answer, nowMs);
-    if (answer.spikes) this.spikes.show(answer.spikes, answer.timeMs);
+    showFlags('flags', flagsOf(answer, this.mostPa));
+    const touch = answer.touch ? readTouch(answer.touch) : null;
+    if (touch) this.meters.press(touch);
+    if (this.mode === 'press') this.finger?.setForce(touch);
+    if (answer.spikes) this.spikes.show(answer.spikes, answer.timeMs, this.press.uvPx);
     this.answered.sequence = answer.sequence;
     this.answered.tier = this.session.ready?.tier;
+    // All pictures are of one frame: what was pressed, what was answered, what is true.
     this.answered.pressurePa.set(answer.pressurePa ?? this.sent.pressurePa);
-    if (!equal(this.answered.sedJPerM3, answer.sedJPerM3)) {
-      this.answered.sedJPerM3.set(answer.sedJPerM3);
-      this.#showSed(nowMs);
-    }
-    if (this.sent.mode === 'replay' && this.mode === 'replay' && !this.replay.judged) this.#showErrors(nowMs);
-  }
-
-  /** What the server found for a pose. */
-  #showTouch({ pressurePa, touch }, nowMs) {
-    const found = readTouch(touch);
-    this.views.pressure.show(pressurePa, nowMs);
-    this.meters.press(found);
-    this.finger?.setForce(found);
+    this.answered.sedJPerM3.set(answer.sedJPerM3);
+    this.#showMaps(nowMs);
+    this.effects.answer(answer, this.views.sed.peak, nowMs);
+    const forceN = touch?.forceN ?? (this.sent.mode === 'press' ? this.press.forceN : NaN);
+    const rateHz = answer.ratesHz ? answer.ratesHz.reduce((a, b) => Math.max(a, b), 0) : NaN;
+    this.timeline.add(nowMs, forceN, this.views.sed.peak, rateHz, this.sent.pressed, answer.serverUs / 1000);
+    if (this.sent.mode === 'replay' && this.mode === 'replay' && this.replay.sent >= 0) this.#showErrors(nowMs);
+    else if (this.sent.mode === 'press' && this.mode === 'press') this.comparison.offer(this.answered.pressurePa, this.answered.sedJPerM3, this.sent.pose, nowMs);
   }
 
   /** The budget may go on with another tier while the session lasts. */
@@ -156,45 +221,100 @@ class Page {
     this.ladder.setReady(ready);
     this.meters.ready(ready, this.ladder.medians(tier));
     this.replay.forget();
+    this.effects.forget();
   }
 
-  #showSed(nowMs) {
-    this.views.sed.show(this.answered.sedJPerM3, nowMs);
+  #showMaps(nowMs) {
+    const { pressure, sed } = this.views;
+    const { atlas, session, answered, scales } = this;
+    // What a model or method gets wrong by on the whole map hides what is smaller than that.
+    const [off] = [this.ladder.medians(answered.tier).find(([set]) => set === byId('ladder-set').value)?.[1] ?? 0];
+    scales.sed.setFloor(off * rms(answered.sedJPerM3, atlas.interface.raster.pixels), `the usual error of ${nameOfTier(answered.tier)}`);
+    const found = session.ready?.expected_error?.pressure_relative_l2.median ?? 0;
+    scales.pressure.setFloor(this.solves ? found * rms(answered.pressurePa, atlas.skin.raster.pixels) : 0, 'the usual error of the contact');
+    pressure.show(answered.pressurePa, nowMs);
+    sed.show(answered.sedJPerM3, nowMs);
     this.#paintFinger();
   }
 
   #paintFinger() {
-    this.finger?.setSed(this.answered.sedJPerM3, this.views.sed.range.max, this.log ? LOG_DECADES : 0);
+    const { sed } = this.scales;
+    this.finger?.setSed(this.answered.sedJPerM3, sed.max, sed.logarithmic ? LOG_DECADES : 0, sed.floor);
   }
 
   #showErrors(nowMs) {
-    const { truth, difference, sed } = this.views;
+    const { other, difference } = this.views;
     this.meters.errors(this.replay.judge(this.answered.sedJPerM3), this.replay.errors, this.replay.sent);
-    truth.show(this.replay.truth, nowMs, sed.range);
+    other.show(this.replay.truth, nowMs);
     difference.show(this.replay.difference, nowMs);
+    byId('other-ms').textContent = 'solved once, before';
+    showFlags('other-flags', []);
+    byId('apart').textContent = `${(100 * this.replay.figures.relativeL2).toFixed(1)} % apart (relative L2)`;
+  }
+
+  /** Both answers are to one contact. */
+  #showPair(first, second, answer) {
+    if (this.mode !== 'press') return;
+    const { other, difference } = this.views;
+    const { pixels } = this.atlas.interface.raster;
+    this.pair.second.set(second);
+    for (let n = 0; n < pixels.length; n++) this.pair.difference[pixels[n]] = first[pixels[n]] - second[pixels[n]];
+    this.pair.apart = relativeL2(first, second, pixels);
+    const nowMs = performance.now();
+    other.show(second, nowMs);
+    difference.show(this.pair.difference, nowMs);
+    showFlags('other-flags', flagsOf(answer, this.comparison.session?.ready?.pressure_max_pa));
+    const what = this.comparison.isMethod ? 'contact and model' : 'model alone';
+    put('other-ms', `${this.comparison.medianMs.toFixed(1)} ms, ${what}`);
+    put('apart', Number.isNaN(this.pair.apart) ? 'no SED' : `${(100 * this.pair.apart).toFixed(1)} % apart (relative L2)`);
+  }
+
+  /** Opens or ends the session of the other way. */
+  #chooseOther() {
+    const what = this.mode === 'press' ? byId('with').value : '';
+    document.body.toggleAttribute('data-with', what !== '');
+    const [kind, name] = what.split(':');
+    const { atlas_hash: atlasHash } = this.#terms();
+    const hello = { atlas_hash: atlasHash, budget_us: 500000 };
+    if (kind === 'tier') Object.assign(hello, { tier: name });
+    else if (kind === 'method') Object.assign(hello, { tier: byId('tier').value || this.answered.tier || null, ...this.contact.terms(name) });
+    this.comparison.choose(what, hello);
+  }
+
+  /** An effect was switched. */
+  #effect(name, on) {
+    if (name === 'spikes') this.spikes.toggle(on);
+    if (name === 'shear_energy' && on && this.contact?.friction === 0) this.#setFriction(FRICTION);
+    this.spikes.toggle(this.effects.on.has('spikes'));
+    this.#open();
+  }
+
+  #setFriction(friction) {
+    byId('friction').value = String(friction);
+    byId('friction-out').textContent = friction > 0 ? friction.toFixed(2) : 'none';
+    if (this.contact) this.contact.friction = friction;
+    if (friction === 0 && this.effects.on.has('shear_energy')) this.effects.set('shear_energy', false);
   }
 
   /** One display frame: newest press, its map, and the map on its way if no answer is due. */
   #frame(nowMs) {
     requestAnimationFrame(this.tick);
-    if (this.solves && this.session.ready && this.contact.isDue(nowMs)) this.#hello(nowMs);
+    if (this.solves && this.session.ready && this.contact.isDue(nowMs)) {
+      this.#hello(nowMs);
+      if (this.comparison.isMethod) this.#chooseOther();
+    }
     const map = this.session.mapFrame.values;
     const changed = this.mode === 'press' ? this.#stepPress(nowMs, map) : this.#stepReplay(nowMs, map);
     if (changed) {
       if (this.unsent && this.session.inFlight) this.meters.skip();
       this.unsent = true;
-      if (!this.solves) this.views.pressure.show(map, nowMs);
-    } else {
-      this.views.pressure.settle(nowMs);
     }
-    if (this.views.sed.settle(nowMs)) {
-      this.#paintFinger();
-      this.views.truth.show(this.replay.truth, nowMs, this.views.sed.range);
-    }
+    for (const scale of Object.values(this.scales)) scale.fit(nowMs);
     const ready = this.mode === 'press' || this.replay.loaded;
     const isQuiet = nowMs - this.session.sentAtMs > QUIET_MS;
     if (ready && (this.unsent || this.stream.checked || isQuiet)) this.#send(nowMs, map);
     this.finger?.draw();
+    this.timeline.draw(nowMs);
     if (this.meters.refresh(nowMs, this.unsent || this.stream.checked, this.session.ready !== null)) {
       const judged = this.mode === 'replay' && this.replay.judged;
       this.ladder.showLive(this.meters.serverMs, judged ? this.meters.errorsNow?.relativeL2 ?? NaN : NaN);
@@ -208,12 +328,23 @@ class Page {
     this.unsent = false;
     this.sent.mode = this.mode;
     this.sent.pressurePa.set(map);
+    this.sent.pose.set(this.session.poseFrame.values);
+    const { press, control } = this;
+    this.sent.pressed = { u: press.uvPx[0], v: press.uvPx[1], depthMm: control.depthMm, slidMm: press.slidMm };
     if (this.mode === 'replay') this.replay.rememberTruth();
   }
 
   #stepPress(nowMs, map) {
-    if (!this.control.step(nowMs)) return false;
+    const due = this.timeline.due(nowMs);
     const { press, control } = this;
+    if (due) {
+      press.moveToPixel(due.u, due.v);
+      press.slideTo(due.slidMm);
+      control.depthMm = due.depthMm;
+      control.lastMs = nowMs;
+    } else if (!control.step(nowMs)) {
+      return false;
+    }
     press.evaluate(control.depthMm);
     this.views.pressure.setMarker(press.uvPx);
     this.finger?.setPress(press);
@@ -238,22 +369,109 @@ class Page {
       input.addEventListener('change', () => this.#setMode(input.value));
     }
     byId('controls').addEventListener('submit', (event) => event.preventDefault());
-    byId('tier').addEventListener('change', () => this.#open());
+    byId('tier').addEventListener('change', () => this.#switchTo(byId('tier').value));
     byId('budget').addEventListener('change', () => this.#open());
-    byId('spikes-on').addEventListener('change', () => {
-      this.spikes.toggle(byId('spikes-on').checked);
+    byId('method').addEventListener('change', () => {
+      if (this.contact) this.contact.method = byId('method').value;
+      this.effects.forget();
       this.#open();
     });
-    byId('log').addEventListener('change', () => {
-      this.log = byId('log').checked;
-      for (const name of ['sed', 'truth']) this.views[name].setLogarithmic(this.log, performance.now());
-      this.#showSed(performance.now());
+    byId('with').addEventListener('change', () => this.#chooseOther());
+    byId('friction').addEventListener('input', () => {
+      this.#setFriction(Number(byId('friction').value));
+      this.effects.forget();
+      this.#open();
     });
     byId('replay-press').addEventListener('change', () => {
       this.#play(false);
       this.replay.choose(Number(byId('replay-press').value));
     });
     byId('replay-play').addEventListener('click', () => this.#play(!this.replay.playing));
+    this.#listenToFiles();
+    this.#listenToShare();
+  }
+
+  #listenToFiles() {
+    const take = async (file) => {
+      try {
+        const mesh = meshOf(await file.arrayBuffer(), file.name);
+        const size = mesh.sideMm >= PLAUSIBLE_MM.least && mesh.sideMm <= PLAUSIBLE_MM.most ? Number(mesh.sideMm.toFixed(2)) : 10;
+        this.control.takeMesh(mesh, size);
+        const kept = size === Number(mesh.sideMm.toFixed(2));
+        byId('mesh-note').textContent = `${file.name}: ${mesh.triangles.length} triangles; ${kept ? 'its own size' : `${mesh.sideMm.toPrecision(3)} mm in the file, made ${size} mm`}. Its +z presses.`;
+      } catch (error) {
+        notify(error.message);
+      }
+    };
+    const end = () => { delete document.body.dataset.dragging; };
+    document.addEventListener('dragover', (event) => {
+      event.preventDefault();
+      document.body.dataset.dragging = '';
+    });
+    document.addEventListener('dragleave', (event) => { if (!event.relatedTarget) end(); });
+    document.addEventListener('drop', (event) => {
+      event.preventDefault();
+      end();
+      if (event.dataTransfer.files.length) take(event.dataTransfer.files[0]);
+    });
+    byId('mesh-file').addEventListener('change', () => { if (byId('mesh-file').files.length) take(byId('mesh-file').files[0]); });
+    // The chip of one's own mesh asks for a file, unless there is one already.
+    document.querySelector('input[name=shape][value=mesh]').addEventListener('click', () => { if (!this.control.mesh) byId('mesh-file').click(); });
+  }
+
+  #listenToShare() {
+    const say = (text) => { byId('share-note').textContent = text; };
+    const copy = async (text, what) => {
+      try {
+        await navigator.clipboard.writeText(text);
+        say(`${what} copied.`);
+      } catch {
+        // Without a secure origin a page may not write the clipboard: what it would hold is shown instead.
+        window.prompt(`${what}:`, text);
+      }
+    };
+    byId('copy-link').addEventListener('click', () => {
+      history.replaceState(null, '', hashOf(this.state));
+      copy(location.href, 'Link');
+    });
+    byId('copy-python').addEventListener('click', () => {
+      if (!this.contact) {
+        say('This server has no contact model: there is no pose to send.');
+        return;
+      }
+      const origin = new URL('.', document.baseURI).href.replace(/\/$/, '');
+      copy(pythonOf({ origin, terms: { ...this.#terms(), ...this.contact.terms(this.contact.method) }, pose: this.session.poseFrame.values }), 'Program');
+    });
+    byId('save-csv').addEventListener('click', () => save('papilla.csv', 'text/csv', this.timeline.csv()));
+    byId('save-npy').addEventListener('click', () => {
+      save('papilla.npy', 'application/octet-stream', npyOf([this.answered.pressurePa, this.answered.sedJPerM3], SIDE_PX));
+      say('papilla.npy: pressure (Pa) and SED (J/m³), 2 x 224 x 224.');
+    });
+    byId('save-png').addEventListener('click', () => {
+      const figures = ['pressure', 'sed', 'other', 'difference'].map(byId);
+      pictureOf(figures, this.finger?.canvas).toBlob((blob) => save('papilla.png', 'image/png', blob));
+    });
+  }
+
+  /** What a link holds. */
+  get state() {
+    return { ...this.control.state, tier: byId('tier').value, budget: byId('budget').value, method: byId('method').value, with: byId('with').value || 'none', friction: byId('friction').value, effects: [...this.effects.on].join(' ') };
+  }
+
+  /** Takes what the link says. */
+  #restore() {
+    const state = stateOf(location.hash);
+    const choose = (id, value) => { if (value && [...byId(id).options].some((option) => option.value === value)) byId(id).value = value; };
+    this.control.state = state;
+    for (const name of ['tier', 'budget', 'method']) choose(name, state[name]);
+    if (this.contact) this.contact.method = byId('method').value;
+    const served = this.listing.tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form');
+    const fastest = served.reduce((a, b) => (a && a.predicted_latency_us <= b.predicted_latency_us ? a : b), null);
+    if (state.with === 'none') byId('with').value = '';
+    else choose('with', state.with ?? (fastest && served.length > 1 ? `tier:${fastest.name}` : ''));
+    if (Number(state.friction) > 0) this.#setFriction(Math.min(1, Number(state.friction)));
+    for (const name of (state.effects ?? '').split(' ')) this.effects.set(name, true);
+    this.spikes.toggle(this.effects.on.has('spikes'));
   }
 
   #setMode(mode) {
@@ -262,8 +480,12 @@ class Page {
     this.control.changed = true;
     this.replay.changed = true;
     this.replay.judged = false;
-    // Replayed are maps, whatever a press is.
+    this.timeline.play(false);
+    // Replayed are maps, whatever a press is; what needs friction of an object cannot be had of them.
+    if (mode === 'replay' && this.effects.on.has('shear_energy')) this.effects.set('shear_energy', false);
+    this.effects.forget();
     if (this.contact) this.#open();
+    this.#chooseOther();
     if (mode === 'replay') {
       this.views.pressure.setMarker(null);
       this.finger?.setPress(null);
@@ -293,10 +515,8 @@ class Page {
   }
 }
 
-/** A press that does not move is answered alike again and again: no reason to draw it again. */
-function equal(a, b) {
-  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
-  return true;
+function put(id, text) {
+  if (byId(id).textContent !== text) byId(id).textContent = text;
 }
 
 function showState(state, detail) {
@@ -306,16 +526,11 @@ function showState(state, detail) {
 }
 
 /** What a network says that has not learnt such a press. */
-function showFlags({ outOfRange, unfamiliar, unsettled, cutOff }, mostPa) {
-  const words = [];
-  if (outOfRange) words.push(`harder than any press it learnt: it saw ${(mostPa / 1000).toFixed(0)} kPa at most`);
-  if (unfamiliar) words.push('unlike any press it learnt: this may mean nothing');
-  if (unsettled) words.push('the contact did not settle: rough');
-  if (cutOff) words.push('cut off at the edge of the map');
+function showFlags(id, words) {
   const text = words.join('; ');
-  if (byId('flags').textContent === text) return;
-  byId('flags').textContent = text;
-  byId('flags').hidden = text === '';
+  if (byId(id).textContent === text) return;
+  byId(id).textContent = text;
+  byId(id).hidden = text === '';
 }
 
 let noticedAtMs = Infinity;
@@ -344,10 +559,11 @@ async function checkMasks(atlas) {
 
 document.body.dataset.mode = 'press';
 document.querySelector('input[name=mode][value=press]').checked = true;
+themeButton(byId('theme'));
 try {
   const atlas = new Atlas(await fetchJson('v1/atlas'));
   byId('atlas-hash').textContent = atlas.hash.slice(0, 12);
-  const page = new Page(atlas, await listTiers());
+  const page = new Page(atlas, await listTiers(), await fetchJson('v1/effects'));
   page.start();
   // For the console and the tests: the last answered pair of maps and what the page holds.
   globalThis.papilla = page;
@@ -355,7 +571,11 @@ try {
 } catch (error) {
   showState('waiting', '');
   byId('state').dataset.state = 'failed';
-  byId('state-text').textContent = 'not working';
-  notify(`${error.message}. Reload the page to try again.`);
-  throw error;
+  byId('state-text').textContent = error.status === 401 ? 'a token is due' : 'not working';
+  if (error.status === 401) {
+    byId('token').hidden = false;
+  } else {
+    notify(`${error.message}. Reload the page to try again.`);
+    throw error;
+  }
 }

@@ -7,14 +7,14 @@
 // where R is the effective radius of the two surfaces, measured on the mesh from the volume of the
 // overlap, a^2 = 2 R share depth is the contact radius and the last factor the stiffening by the bone.
 
+import { SHAPES } from './shapes.mjs';
+
 /**
  * E (plane-strain modulus, Pa), share (1/2 for a half-space) and layer (mm), fitted to the presses of
  * the campaign s1 (plate, 0.25 to 2 mm, all angles): relative L2 over the mesh 16 %, force 12 %.
  */
 export const HERTZ = { modulusPa: 62000, share: 0.6, layerMm: 7.5 };
 
-const PLATE_HALF_MM = 10;
-const PLATE_ROUNDING_MM = 0.5;
 /** Least cosine between the skin's normal and the indenter's axis: skin that looks away is not touched. */
 const FACING = 0.05;
 
@@ -23,8 +23,13 @@ export class Press {
   constructor(atlas) {
     this.atlas = atlas;
     this.shape = 'plate';
-    this.radiusMm = 4;
+    this.sizeMm = 4;
+    this.body = SHAPES.plate.make();
     this.angleRad = 0;
+    /** How far the indenter leans along the finger and across it. */
+    this.tiltRad = [0, 0];
+    /** How far it has slid along its first tangent, mm. */
+    this.slidMm = 0;
     this.hit = { triangle: 0, weightB: 0, weightC: 0 };
     this.pointMm = new Float32Array(3);
     this.uvPx = new Float32Array(2);
@@ -61,12 +66,26 @@ export class Press {
     this.#aim();
   }
 
-  /** Changes shape ('plate' | 'sphere' | 'edge'), radius and the edge's direction. */
-  setShape(shape, radiusMm, angleRad) {
+  /** Changes shape (a name of `SHAPES`), its size, its direction and its lean; `mesh` is one's own. */
+  setShape(shape, sizeMm, angleRad, tiltRad = this.tiltRad, mesh = undefined) {
+    const key = `${shape} ${sizeMm} ${mesh?.name}`;
+    if (key !== this.bodyKey) {
+      this.body = SHAPES[shape].make(sizeMm, mesh);
+      this.bodyKey = key;
+    }
     this.shape = shape;
-    this.radiusMm = radiusMm;
+    this.sizeMm = sizeMm;
     this.angleRad = angleRad;
+    this.tiltRad = tiltRad;
     this.#aim();
+  }
+
+  /** Slides so far from where it was put, along its first tangent. */
+  slideTo(mm) {
+    const by = mm - this.slidMm;
+    this.slidMm = mm;
+    for (let k = 0; k < 3; k++) this.pointMm[k] += by * this.tangent[k];
+    this.#measureGaps(this.touchMm);
   }
 
   /** Pressure of every vertex at this depth; also force, area and peak. */
@@ -133,14 +152,22 @@ export class Press {
       tangent[k] = cos * t + sin * bitangent[k];
       bitangent[k] = cos * bitangent[k] - sin * t;
     }
-    this.#measureGaps();
+    // It leans about its own two tangents, over the point that it presses.
+    turn(normal, tangent, this.tiltRad[0]);
+    turn(normal, bitangent, this.tiltRad[1]);
+    for (let k = 0; k < 3; k++) pointMm[k] += this.slidMm * tangent[k];
+    this.#measureGaps(null);
   }
 
-  /** Gap of each vertex to the indenter when it first touches; Infinity beside or behind it. */
-  #measureGaps() {
+  /**
+   * Gap of each vertex to the indenter when it first touches; Infinity beside or behind it. What slides
+   * keeps the height `touchMm` at which it touched first.
+   */
+  #measureGaps(touchMm) {
     const { gapMm, normal: n, tangent: t, bitangent: b, pointMm: o } = this;
     const { positionsMm: p } = this.atlas.skin;
     const { normals } = this.atlas;
+    const { profile } = this.body;
     let first = -Infinity;
     for (let i = 0, k = 0; i < gapMm.length; i++, k += 3) {
       const x = p[k] - o[0];
@@ -151,33 +178,28 @@ export class Press {
       const across = x * b[0] + y * b[1] + z * b[2];
       const height = x * n[0] + y * n[1] + z * n[2];
       // Rounded as it is stored, so that the first to touch has a gap of exactly 0.
-      const reach = facing > FACING ? Math.fround(height - this.#profile(along, across)) : -Infinity;
+      const reach = facing > FACING ? Math.fround(height - profile(along, -across)) : -Infinity;
       gapMm[i] = reach;
       if (reach > first) first = reach;
     }
-    // A small indenter may fall between the vertices of a coarse mesh: it then touches nothing.
+    // A narrow indenter may fall between the vertices of a coarse mesh: the point that it is put on is skin too.
+    const at = Math.fround(-profile(0, 0));
+    if (at > first) first = at;
     if (first === -Infinity) first = 0;
+    if (touchMm !== null) first = touchMm;
     this.touchMm = first;
     for (let i = 0; i < gapMm.length; i++) gapMm[i] = first - gapMm[i];
   }
-
-  /** Height of the indenter's surface over its lowest point, mm. */
-  #profile(along, across) {
-    if (this.shape === 'plate') {
-      return roundedEdge(Math.abs(along)) + roundedEdge(Math.abs(across));
-    }
-    // The edge is a round bar along `bitangent`: at 0 degrees it lies across the finger.
-    const offset = this.shape === 'sphere' ? Math.hypot(along, across) : along;
-    const r = this.radiusMm;
-    if (Math.abs(offset) >= r || Math.abs(across) > PLATE_HALF_MM) return Infinity;
-    return r - Math.sqrt(r * r - offset * offset);
-  }
 }
 
-function roundedEdge(distanceMm) {
-  const over = distanceMm - (PLATE_HALF_MM - PLATE_ROUNDING_MM);
-  if (over <= 0) return 0;
-  return over >= PLATE_ROUNDING_MM ? Infinity : PLATE_ROUNDING_MM - Math.sqrt(PLATE_ROUNDING_MM ** 2 - over * over);
+/** Turns two perpendicular unit vectors in their plane: `a` towards `b`. */
+function turn(a, b, rad) {
+  const [cos, sin] = [Math.cos(rad), Math.sin(rad)];
+  for (let k = 0; k < 3; k++) {
+    const x = a[k];
+    a[k] = cos * x + sin * b[k];
+    b[k] = cos * b[k] - sin * x;
+  }
 }
 
 function cross(a, b, out) {

@@ -1,29 +1,25 @@
-// Papilla's session protocol, client side: one WebSocket, a JSON hello, a JSON ready, then binary frames
-// of a 48-byte little-endian header and a payload (here always f32): a row-major 224 x 224 map, or an object's pose.
+// The page's session: one frame in flight, so that the newest press is always the next one sent. Bytes
+// and connection are those of the web client (clients/web); here is what only the page does.
 
+import { Link } from './link.js';
+import { FLAG, HEADER_BYTES, MAGIC, MAP_LEN, SIDE_PX, STATUS, VERSION } from './wire.js';
 import { SpikeSection } from './spikes.mjs';
 
-export const SIDE_PX = 224;
-export const MAP_LEN = SIDE_PX * SIDE_PX;
-export const HEADER_BYTES = 48;
+export { HEADER_BYTES, MAP_LEN, SIDE_PX };
 
-const VERSION = 3;
-
-const STATUS = ['ok', 'superseded', 'late', 'error', 'late'];
-const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
 const KIND = { pressure: 1, sed: 2, objects: 4 };
 const POSE_LEN = 7;
 const TOUCH_LEN = 16;
+const SUMMARY_LEN = 16;
+const RATES_HEAD = 4;
 const SAMPLE_F32 = 0;
 const TWO_POW_32 = 4294967296;
-const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal']);
-const BACK_OFF_MS = { first: 250, last: 400 };
-/** A server that says nothing for so many of these is given up; counted by a timer, which stands still where the page does. */
+const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal', 'rate_limited']);
+/** A server that says nothing for so long is given up; counted by a timer, which stands still where the page does. */
 const WATCH_MS = 250;
-const SILENT_WATCHES = 7;
-const FLAG = { outOfRange: 1, unfamiliar: 4, unsettled: 8, cutOff: 16 };
+const SILENT_MS = 3000;
 /** Where the sections of an answer begin. */
-const BARE_MAP = { map: HEADER_BYTES };
+const BARE_MAP = { map: { offset: HEADER_BYTES, bytes: 4 * MAP_LEN } };
 
 /** A request frame whose buffer is made once and refilled for every frame. */
 export class RequestFrame {
@@ -59,7 +55,18 @@ export class RequestFrame {
   }
 }
 
-/** Reads an answer into `into`; `at` is where its sections begin. Throws an Error that says what is wrong with the frame. */
+/** What an answer holds; made once, and filled anew by `readAnswer`. */
+export function emptyAnswer() {
+  return {
+    status: 'error', sequence: 0, serverUs: 0, queueUs: 0, networkUs: 0, solveUs: 0, bytes: 0, timeMs: 0, tierNumber: 0,
+    sedJPerM3: null, pressurePa: null, touch: null, spikes: null, ratesHz: null, summary: null, points: null, actuators: null,
+    outOfRange: false, noContact: false, unfamiliar: false, unsettled: false, cutOff: false, coarseClock: false,
+  };
+}
+
+const CARRIED = ['sedJPerM3', 'pressurePa', 'touch', 'spikes', 'ratesHz', 'summary', 'points', 'actuators'];
+
+/** Reads an answer into `into`; `at` is where its sections are. Throws an Error that says what is wrong with the frame. */
 export function readAnswer(data, into, at = BARE_MAP) {
   if (data.byteLength < HEADER_BYTES) {
     throw new Error(`answer of ${data.byteLength} bytes is shorter than its ${HEADER_BYTES}-byte header`);
@@ -71,24 +78,45 @@ export function readAnswer(data, into, at = BARE_MAP) {
   into.status = STATUS[view.getUint8(7)] ?? 'error';
   into.sequence = view.getUint32(8, true);
   into.serverUs = view.getUint32(24, true);
+  into.queueUs = view.getUint32(36, true);
+  into.networkUs = view.getUint32(40, true);
+  into.solveUs = 0;
+  into.bytes = data.byteLength;
   into.tierNumber = view.getUint16(44, true);
-  into.outOfRange = (view.getUint8(46) & FLAG.outOfRange) !== 0;
-  into.cutOff = (view.getUint8(46) & FLAG.cutOff) !== 0;
-  into.unfamiliar = (view.getUint8(46) & FLAG.unfamiliar) !== 0;
-  into.unsettled = (view.getUint8(46) & FLAG.unsettled) !== 0;
+  const flags = view.getUint8(46);
+  for (const name of ['outOfRange', 'noContact', 'unfamiliar', 'unsettled', 'cutOff', 'coarseClock']) into[name] = (flags & FLAG[name]) !== 0;
   into.timeMs = (view.getUint32(16, true) + view.getUint32(20, true) * TWO_POW_32) / 1000;
-  into.sedJPerM3 = into.pressurePa = into.touch = into.spikes = null;
-  if (into.status === 'ok') {
-    const sampleType = view.getUint8(6);
-    if (sampleType !== SAMPLE_F32 || data.byteLength !== at.map + 4 * MAP_LEN) {
-      throw new Error(`answer of sample type ${sampleType} and ${data.byteLength} bytes is not an f32 map`);
-    }
-    into.sedJPerM3 = new Float32Array(data, at.map, MAP_LEN);
-    if (at.pressure) into.pressurePa = new Float32Array(data, at.pressure, MAP_LEN);
-    if (at.spikes) into.spikes = new SpikeSection(data, at.spikes, at.map - at.spikes);
-    if (at.touch) into.touch = new Float32Array(data, at.touch, TOUCH_LEN);
-  }
+  for (const name of CARRIED) into[name] = null;
+  if (into.status === 'ok') readSections(data, view, into, at);
   return into;
+}
+
+function readSections(data, view, into, at) {
+  const floats = (section, length) => (section ? new Float32Array(data, section.offset, length ?? section.bytes / 4) : null);
+  if (at.map) into.sedJPerM3 = readMap(data, view, at.map.offset);
+  into.pressurePa = floats(at.pressure, MAP_LEN);
+  into.touch = floats(at.touch, TOUCH_LEN);
+  if (into.touch) [into.solveUs] = [into.touch[15]];
+  into.summary = floats(at.summary, SUMMARY_LEN);
+  into.points = floats(at.points);
+  into.actuators = floats(at.actuators);
+  into.ratesHz = at.rates ? floats(at.rates).subarray(RATES_HEAD) : null;
+  if (at.spikes) into.spikes = new SpikeSection(data, at.spikes.offset, at.spikes.bytes);
+}
+
+/** The map of an answer: a view of the message, or a whole map made of its window. */
+function readMap(data, view, offset) {
+  const [width, height, column, row] = [12, 14, 32, 34].map((place) => view.getUint16(place, true));
+  const sampleType = view.getUint8(6);
+  const fits = column + width <= SIDE_PX && row + height <= SIDE_PX;
+  if (sampleType !== SAMPLE_F32 || data.byteLength !== offset + 4 * width * height || !fits) {
+    throw new Error(`answer of sample type ${sampleType}, ${width} x ${height} and ${data.byteLength} bytes is not an f32 map`);
+  }
+  const samples = new Float32Array(data, offset, width * height);
+  if (samples.length === MAP_LEN) return samples;
+  const map = new Float32Array(MAP_LEN);
+  for (let y = 0; y < height; y++) map.set(samples.subarray(y * width, (y + 1) * width), (row + y) * SIDE_PX + column);
+  return map;
 }
 
 /**
@@ -96,18 +124,15 @@ export function readAnswer(data, into, at = BARE_MAP) {
  * answer is due, so the caller's newest map is always the next one sent.
  *
  * Callbacks: `onstate(state, detail)` with state connecting | ready | waiting | refused;
- * `onready(ready)`; `onanswer(answer, roundTripMs)`; `onfault(code, message)`.
+ * `onready(ready)`; `onanswer(answer, roundTripMs)`; `onfault(code, message, problem)`.
  */
 export class Session {
-  constructor(url, callbacks) {
-    this.url = url;
+  constructor(url, callbacks, silentMs = SILENT_MS) {
     this.callbacks = callbacks;
+    this.silentMs = silentMs;
     this.mapFrame = RequestFrame.map();
     this.poseFrame = RequestFrame.pose();
-    this.answer = {
-      status: 'error', sequence: 0, serverUs: 0, timeMs: 0, tierNumber: 0, sedJPerM3: null, pressurePa: null, touch: null,
-      spikes: null, outOfRange: false, unfamiliar: false, unsettled: false, cutOff: false,
-    };
+    this.answer = emptyAnswer();
     this.sections = BARE_MAP;
     this.sequence = 0;
     this.inFlight = false;
@@ -115,30 +140,37 @@ export class Session {
     this.watched = -1;
     this.silentWatches = 0;
     this.ready = null;
-    this.socket = null;
-    this.timer = 0;
-    this.delayMs = BACK_OFF_MS.first;
     this.wish = { tier: null, budget_us: 50000 };
-    this.retryNow = () => this.#connect();
-    setInterval(() => this.#watch(), WATCH_MS);
+    this.link = new Link(url, {
+      connecting: () => this.callbacks.onstate('connecting', ''),
+      opened: () => this.#hello(),
+      prepared: () => {},
+      text: (text) => this.#text(text),
+      binary: (data) => this.#binary(data),
+      lost: (why) => this.#lost(why),
+    });
+    this.timer = setInterval(() => this.#watch(), WATCH_MS);
   }
 
   /** Asks for the wished tier (null: the server's choice) and budget, in the open session if there is one. */
   open(wish) {
     this.wish = { ...wish };
-    this.delayMs = BACK_OFF_MS.first;
-    if (!this.ready || this.socket.readyState !== WebSocket.OPEN) {
-      this.#connect();
-      return;
-    }
     // A frame on its way is still answered by the old tier: that answer says nothing about the new one.
     this.ready = null;
     this.inFlight = false;
-    this.#hello(this.socket);
+    if (this.link.isOpen) this.#hello();
+    else if (!this.link.isBusy) this.link.connect();
   }
 
-  #hello(socket) {
-    socket.send(JSON.stringify({ type: 'hello', version: VERSION, effects: [], sample_type: 'f32', ...this.wish }));
+  /** Ends the session for good. */
+  close() {
+    clearInterval(this.timer);
+    this.#forget();
+    this.link.drop();
+  }
+
+  #hello() {
+    this.link.send(JSON.stringify({ type: 'hello', version: VERSION, effects: [], sample_type: 'f32', ...this.wish }));
   }
 
   /** Sends the frame; false while an answer is due or the session is not ready. */
@@ -148,46 +180,28 @@ export class Session {
     frame.stamp(this.sequence, Math.round((performance.timeOrigin + nowMs) * 1000));
     this.sentAtMs = performance.now();
     this.inFlight = true;
-    this.socket.send(frame.buffer);
+    this.link.send(frame.buffer);
     return true;
   }
 
   /** Gives up a connection on which an answer, or a session, is due for too long. */
   #watch() {
-    const isDue = this.socket !== null && (this.inFlight || !this.ready);
+    const isDue = this.link.isBusy && (this.inFlight || !this.ready);
     const due = this.inFlight ? this.sequence : -1;
     this.silentWatches = isDue && due === this.watched ? this.silentWatches + 1 : 0;
     this.watched = due;
-    if (this.silentWatches >= SILENT_WATCHES) this.#closed({ reason: 'the server is silent' });
+    if (this.silentWatches * WATCH_MS >= this.silentMs) this.link.giveUp('the server is silent');
   }
 
-  #connect() {
-    clearTimeout(this.timer);
-    this.#drop();
-    this.callbacks.onstate('connecting', '');
-    const socket = new WebSocket(this.url);
-    socket.binaryType = 'arraybuffer';
-    this.socket = socket;
-    socket.onopen = () => this.#hello(socket);
-    socket.onmessage = (event) => {
-      if (typeof event.data === 'string') this.#text(event.data);
-      else this.#binary(event.data);
-    };
-    socket.onclose = (event) => this.#closed(event);
-  }
-
-  #drop() {
+  #forget() {
     this.silentWatches = 0;
-    const old = this.socket;
-    this.socket = null;
     this.ready = null;
     this.inFlight = false;
-    if (old) {
-      old.onmessage = old.onclose = null;
-      // Closing a socket that is still connecting makes the browser complain: let it connect first.
-      if (old.readyState === WebSocket.CONNECTING) old.onopen = () => old.close();
-      else old.close();
-    }
+  }
+
+  #lost(why) {
+    this.#forget();
+    this.callbacks.onstate('waiting', `${why}; trying again`);
   }
 
   #text(text) {
@@ -195,28 +209,30 @@ export class Session {
     try {
       message = JSON.parse(text);
     } catch {
-      this.callbacks.onfault('bad_json', 'the server sent a text that is not JSON');
+      this.callbacks.onfault('bad_json', 'the server sent a text that is not JSON', null);
       return;
     }
     if (message.type === 'ready') {
+      this.link.succeeded();
       this.ready = message;
-      this.sections = Object.fromEntries(message.sections.map(({ name, offset }) => [name, offset]));
-      this.delayMs = BACK_OFF_MS.first;
+      this.sections = Object.fromEntries(message.sections.map((section) => [section.name, section]));
       this.callbacks.onready(message);
       this.callbacks.onstate('ready', '');
     } else if (message.type === 'error') {
-      if (message.sequence === undefined || message.sequence === null || message.sequence === this.sequence) {
-        this.inFlight = false;
-      }
-      this.callbacks.onfault(message.code, message.message);
-      // A refused hello would be refused again: wait for the visitor to choose otherwise. What passes
-      // by itself is left to the close that follows, and to the back-off.
-      const ofFrame = message.sequence !== undefined && message.sequence !== null;
-      if (!this.ready && !ofFrame && !PASSING.has(message.code)) {
-        this.#drop();
-        this.callbacks.onstate('refused', message.message);
-      }
+      this.#refused(message);
     }
+  }
+
+  #refused(message) {
+    const ofFrame = message.sequence !== undefined && message.sequence !== null;
+    if (!ofFrame || message.sequence === this.sequence) this.inFlight = false;
+    this.callbacks.onfault(message.code, message.message, message);
+    // A refused hello would be refused again: wait for the visitor to choose otherwise. What passes
+    // by itself is left to the close that follows, and to the next attempt.
+    if (this.ready || ofFrame || PASSING.has(message.code)) return;
+    this.#forget();
+    this.link.drop();
+    this.callbacks.onstate('refused', message.message);
   }
 
   #binary(data) {
@@ -224,23 +240,21 @@ export class Session {
     // A stale sequence is the answer to a frame given up before, on other terms: it says nothing about this one.
     const isWhole = data.byteLength >= HEADER_BYTES;
     if (!this.inFlight || (isWhole && new DataView(data).getUint32(8, true) !== this.sequence)) return;
+    this.inFlight = false;
     try {
       readAnswer(data, this.answer, this.sections);
     } catch (error) {
-      this.inFlight = false;
-      this.callbacks.onfault('bad_frame', error.message);
+      this.callbacks.onfault('bad_frame', error.message, null);
       return;
     }
-    this.inFlight = false;
+    if (this.answer.status === 'stale') this.answer.status = 'late';
     this.callbacks.onanswer(this.answer, nowMs - this.sentAtMs);
   }
+}
 
-  #closed(event) {
-    this.#drop();
-    const jitter = 0.75 + 0.5 * Math.random();
-    const waitMs = this.delayMs * jitter;
-    this.delayMs = Math.min(2 * this.delayMs, BACK_OFF_MS.last);
-    this.callbacks.onstate('waiting', `${event.reason || 'connection lost'}; trying again in ${(waitMs / 1000).toFixed(1)} s`);
-    this.timer = setTimeout(this.retryNow, waitMs);
-  }
+/** Where this page's service takes sessions. */
+export function sessionUrl() {
+  const url = new URL('v1/session', document.baseURI);
+  url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+  return url.href;
 }

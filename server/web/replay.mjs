@@ -140,5 +140,5 @@ async function answered(path, accept) {
   const response = await fetch(path, { headers: { accept } });
   if (response.ok) return response;
   const said = await response.json().catch(() => null);
-  throw new Error(`${path}: ${said?.error?.message ?? `HTTP ${response.status}`}`);
+  throw Object.assign(new Error(`${path}: ${said?.error?.message ?? `HTTP ${response.status}`}`), { status: response.status });
 }

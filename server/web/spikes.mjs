@@ -1,10 +1,18 @@
-// A raster plot of the finger's touch units: a row a unit, the last two seconds, newest on the right.
+// A raster plot of the finger's touch fibres: a row a fibre, a band a class, the last two seconds.
+
+import { onTheme } from './theme.mjs';
 
 const SPAN_MS = 2000;
 const REFRESH_MS = 500;
 const HEAD_BYTES = 8;
 const SPIKE_BYTES = 4;
 const CLASSES = ['sa1', 'ra', 'pc'];
+const NAMES = ['SA1: held skin', 'RA: moving skin', 'Pacinian: vibration'];
+/** Fibres shown of each class: so many rows can be told apart. */
+const SHOWN = [16, 20, 8];
+const BAND_PX = 16;
+const AXIS_PX = 16;
+const KEPT = 16384;
 
 const byId = (id) => document.getElementById(id);
 
@@ -28,15 +36,42 @@ export class SpikeSection {
   }
 }
 
+/** Rows of the fibres that are shown: of each class those nearest to a place, in that order; -1: not shown. */
+export function rowsNear(units, [u, v]) {
+  const rows = new Int32Array(units.length).fill(-1);
+  CLASSES.forEach((name, kind) => {
+    const near = Array.from(units.keys()).filter((unit) => units[unit].class === name);
+    const distance = (unit) => Math.hypot(units[unit].px[0] - u, units[unit].px[1] - v);
+    near.sort((a, b) => distance(a) - distance(b) || a - b);
+    near.slice(0, SHOWN[kind]).forEach((unit, row) => { rows[unit] = row; });
+  });
+  return rows;
+}
+
 export class SpikeView {
   constructor() {
     this.canvas = byId('spike-plot');
     this.isOn = false;
-    this.rows = new Uint16Array(0);
+    this.units = [];
+    this.rows = new Int32Array(0);
     this.classes = new Uint8Array(0);
+    this.counts = [0, 0, 0];
+    /** The last spikes, oldest overwritten first: unit and time. */
+    this.unitOf = new Uint16Array(KEPT);
+    this.atMs = new Float64Array(KEPT).fill(-Infinity);
+    this.next = 0;
     this.fired = new Float64Array(CLASSES.length);
-    this.column = 0;
     this.ratedAtMs = 0;
+    this.place = [NaN, NaN];
+    this.#readTheme();
+    onTheme(() => this.#readTheme());
+  }
+
+  #readTheme() {
+    const style = getComputedStyle(this.canvas);
+    this.colours = CLASSES.map((name) => style.getPropertyValue(`--${name}`));
+    this.ink = style.getPropertyValue('--muted');
+    this.line = style.getPropertyValue('--line');
   }
 
   /** Shows or hides the plot. */
@@ -45,57 +80,77 @@ export class SpikeView {
     byId('spikes').hidden = !on;
   }
 
-  /** Takes the units of a session: rows are in the order of class. */
+  /** Takes the fibres of a session. */
   setUnits(units) {
     if (!units) return;
+    this.units = units;
     this.classes = Uint8Array.from(units, (unit) => CLASSES.indexOf(unit.class));
-    const order = Array.from(units.keys()).sort((a, b) => this.classes[a] - this.classes[b] || a - b);
-    this.rows = new Uint16Array(units.length);
-    order.forEach((unit, row) => { this.rows[unit] = row; });
-    CLASSES.forEach((name, kind) => {
-      byId(`spikes-${name}-units`).textContent = String(this.classes.reduce((n, of) => n + (of === kind), 0));
-    });
-    this.column = 0;
+    this.counts = CLASSES.map((_, kind) => this.classes.reduce((n, of) => n + (of === kind), 0));
+    CLASSES.forEach((name, kind) => { byId(`spikes-${name}-units`).textContent = String(this.counts[kind]); });
+    this.atMs.fill(-Infinity);
+    this.place = [NaN, NaN];
   }
 
-  /** Draws the spikes of an answer to a frame of this time. */
-  show(section, timeMs) {
-    const context = this.#scroll(timeMs);
-    const { width, height } = this.canvas;
-    const style = getComputedStyle(this.canvas);
-    const colours = CLASSES.map((name) => style.getPropertyValue(`--${name}`));
-    const rowHeight = height / Math.max(1, this.rows.length);
-    // Rows are thinner than what an eye finds.
-    const mark = Math.max(1.5 * (window.devicePixelRatio || 1), rowHeight);
+  /** Rows go to the fibres nearest to the point that is pressed. */
+  #follow([u, v]) {
+    if (Math.hypot(u - this.place[0], v - this.place[1]) < 1) return;
+    this.place = [u, v];
+    this.rows = rowsNear(this.units, this.place);
+  }
+
+  /** Draws the spikes of an answer to a frame of this time; `uvPx` is where the press is. */
+  show(section, timeMs, uvPx) {
+    this.#follow(uvPx);
     for (let n = 0; n < section.count; n++) {
       const unit = section.unit(n);
-      const kind = this.classes[unit];
-      const x = width - 1 - Math.floor((section.beforeMs(n) / SPAN_MS) * width);
-      context.fillStyle = colours[kind];
-      context.fillRect(x, Math.floor(this.rows[unit] * rowHeight), mark, mark);
-      this.fired[kind]++;
+      this.unitOf[this.next] = unit;
+      this.atMs[this.next] = timeMs - section.beforeMs(n);
+      this.next = (this.next + 1) % KEPT;
+      this.fired[this.classes[unit]]++;
     }
+    this.#draw(timeMs);
     this.#rate(timeMs);
   }
 
-  /** Moves what is drawn to the left by the time that passed. */
-  #scroll(timeMs) {
+  #draw(nowMs) {
     const { canvas } = this;
     const ratio = Math.min(2, window.devicePixelRatio || 1);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((px) => Math.round(px * ratio));
-    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    const [w, h] = [width, height].map((px) => Math.round(px * ratio));
+    if (w === 0 || h === 0) return;
+    if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
     const context = canvas.getContext('2d');
-    const column = Math.floor((timeMs / SPAN_MS) * width);
-    const shift = column - this.column;
-    this.column = column;
-    if (shift < 0 || shift >= width) {
-      context.clearRect(0, 0, width, height);
-    } else if (shift > 0) {
-      context.globalCompositeOperation = 'copy';
-      context.drawImage(canvas, -shift, 0);
-      context.globalCompositeOperation = 'source-over';
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    context.font = '11px system-ui, sans-serif';
+    const total = SHOWN.reduce((sum, n) => sum + n, 0);
+    const rowPx = (height - AXIS_PX - BAND_PX * CLASSES.length) / total;
+    const tops = [];
+    let top = 0;
+    CLASSES.forEach((_, kind) => {
+      context.fillStyle = this.colours[kind];
+      context.fillText(`${NAMES[kind]} (${Math.min(SHOWN[kind], this.counts[kind])} of ${this.counts[kind]} fibres, the nearest on top)`, 2, top + 12);
+      top += BAND_PX;
+      tops.push(top);
+      context.fillStyle = this.line;
+      for (let row = 0; row <= SHOWN[kind]; row += SHOWN[kind]) context.fillRect(0, Math.round(top + row * rowPx), width, 1);
+      top += SHOWN[kind] * rowPx;
+    });
+    for (let n = 0; n < KEPT; n++) {
+      const ago = nowMs - this.atMs[n];
+      const row = ago < SPAN_MS ? this.rows[this.unitOf[n]] : -1;
+      if (row < 0) continue;
+      const kind = this.classes[this.unitOf[n]];
+      context.fillStyle = this.colours[kind];
+      context.fillRect(width - (ago / SPAN_MS) * width - 1, tops[kind] + row * rowPx + 0.5, 2.5, Math.max(2, rowPx - 1));
     }
-    return context;
+    context.fillStyle = this.ink;
+    for (let s = 0; s <= 2; s += 0.5) {
+      const x = width - (s * 1000 / SPAN_MS) * width;
+      context.textAlign = s === 0 ? 'right' : s === 2 ? 'left' : 'center';
+      context.fillText(s === 0 ? 'now' : `−${s} s`, x, height - 3);
+    }
+    context.textAlign = 'left';
   }
 
   #rate(timeMs) {

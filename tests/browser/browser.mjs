@@ -39,3 +39,15 @@ export function placeOfPeak(values) {
   for (let i = 1; i < values.length; i++) if (values[i] > values[best]) best = i;
   return { row: Math.floor(best / 224), column: best % 224 };
 }
+
+/** Keeps every WebSocket that the page opens in `sockets`, so that a test can end them. */
+export const watchSockets = (page) => page.addInitScript(() => {
+  const Real = globalThis.WebSocket;
+  globalThis.sockets = [];
+  globalThis.WebSocket = class extends Real {
+    constructor(...terms) {
+      super(...terms);
+      globalThis.sockets.push(this);
+    }
+  };
+});

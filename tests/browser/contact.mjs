@@ -1,6 +1,7 @@
 // The page against a server as it ships, with a contact model: a press is a solve there, and what pushes back is shown.
 
 import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
 import { BASE, largest, launch, placeOfPeak } from './browser.mjs';
 
@@ -66,7 +67,9 @@ test('a press is solved by the server, and the page says so', async () => {
 });
 
 test('every indenter pushes back along its normal, from where it stands', async () => {
-  for (const shape of ['sphere', 'edge', 'plate']) {
+  const shapes = await page.locator('input[name=shape]').evaluateAll((all) => all.map((input) => input.value));
+  assert.equal(shapes.length, 11, String(shapes));
+  for (const shape of [...shapes, 'plate']) {
     await chooseRadio('shape', shape);
     await settled();
     const { force, forceN, normal, centreMm, pointMm } = await felt();
@@ -80,7 +83,7 @@ test('a larger ball pushes back harder, and so does a deeper press', async () =>
   await chooseRadio('shape', 'sphere');
   const forces = [];
   for (const [radius, depth] of [['3', '0.6'], ['9', '0.6'], ['9', '1.4']]) {
-    await page.fill('#radius', radius);
+    await page.fill('#size', radius);
     await page.fill('#depth', depth);
     await settled();
     forces.push((await felt()).forceN);
@@ -119,6 +122,140 @@ test('replay sends maps as ever, and a press is solved again after it', async ()
   await until(() => globalThis.papilla.session.ready?.method);
   await settled();
   assert.ok((await felt()).forceN > 0);
+});
+
+test('a second model answers the same contact, and the difference is of that pair', async () => {
+  await page.selectOption('#with', 'tier:pico');
+  await settled();
+  await until(() => globalThis.papilla.pair.apart > 0 && / % apart/.test(document.getElementById('apart').textContent));
+  const { first, second, difference, apart, pixels } = await page.evaluate(() => {
+    const { comparison, pair, atlas } = globalThis.papilla;
+    return { first: Array.from(comparison.first), second: Array.from(pair.second), difference: Array.from(pair.difference), apart: pair.apart, pixels: Array.from(atlas.interface.raster.pixels) };
+  });
+  // The press stands still, so that the frame that is on its way is the same contact.
+  let [error, size] = [0, 0];
+  for (const i of pixels) {
+    assert.ok(Math.abs(difference[i] - (first[i] - second[i])) <= 1e-3 * largest(first));
+    error += difference[i] ** 2;
+    size += second[i] ** 2;
+  }
+  assert.ok(Math.abs(Math.sqrt(error / size) / apart - 1) < 1e-3, `${Math.sqrt(error / size)}, shown ${apart}`);
+  assert.ok(apart < 1 && largest(second) > 1);
+  await page.selectOption('#with', 'method:springs');
+  await until(() => globalThis.papilla.comparison.session.ready?.method === 'springs');
+  await until(() => /contact and model/.test(document.getElementById('other-ms').textContent));
+  await page.selectOption('#with', '');
+  assert.equal(await page.locator('#other').isVisible(), false);
+});
+
+test('an effect is computed only while it is switched on, and says what it brought', async () => {
+  const effects = () => page.evaluate(() => globalThis.papilla.session.ready?.session_effects ?? null);
+  await settled();
+  assert.deepEqual(await effects(), []);
+  assert.match(await page.locator('#effects-note').textContent(), /Nothing is named/);
+  for (const [name, words] of [['afferents', /^fastest \d+ Hz$/], ['summary', /^\d+\.\d\d N on \d+ mm²$/], ['points', /J\/m³$/], ['contact_window', /^\d+ KiB an answer$/]]) {
+    await page.check(`#effect-${name}`);
+    await until((wanted) => globalThis.papilla.session.ready?.session_effects.includes(wanted), name);
+    await until(([wanted, source]) => new RegExp(source, 'u').test(document.getElementById(`effect-${wanted}`).closest('tr').cells[2].textContent), [name, words.source]);
+    await page.uncheck(`#effect-${name}`);
+    await until(() => globalThis.papilla.session.ready?.session_effects.length === 0);
+  }
+  await page.check('#effect-spikes');
+  await until(() => globalThis.papilla.spikes.units.length > 0);
+  assert.ok(await page.locator('#spikes').isVisible());
+  await page.uncheck('#effect-spikes');
+  assert.equal(await page.locator('#spikes').isVisible(), false);
+  // What follows a switch is held against what was before it.
+  await until(() => globalThis.papilla.effects.recent.count >= 12);
+  await page.check('#effect-summary');
+  await until(() => /^Summary on: [+−].* ms a frame now/.test(document.getElementById('effects-note').textContent));
+  await page.uncheck('#effect-summary');
+});
+
+test('friction is of the object, and shear comes with it', async () => {
+  await page.check('#effect-shear_energy');
+  await until(() => globalThis.papilla.session.ready?.session_effects.includes('shear_energy'));
+  assert.match(await page.locator('#friction-out').textContent(), /^0\.50$/);
+  await page.fill('#slide', '10');
+  await until(() => Math.abs(globalThis.papilla.press.slidMm) > 1);
+  await page.fill('#slide', '0');
+  await page.fill('#friction', '0');
+  await until(() => globalThis.papilla.session.ready?.session_effects.length === 0);
+  assert.equal(await page.isChecked('#effect-shear_energy'), false);
+  await settled();
+});
+
+test('every hard case is refused or flagged, or answered without a fault', async () => {
+  const due = { 'Not a number': 'refused', 'No rotation': 'refused', Checkerboard: 'flagged', 'Ten times the range': 'flagged', Blade: 'flagged', 'Off the edge': 'flagged', 'Metres for mm': 'flagged', 'Jump of 10 mm': 'plain' };
+  for (const [name, kind] of Object.entries(due)) {
+    await page.locator('#hard-cases button', { hasText: name }).click();
+    await until((state) => document.getElementById('hard-case').dataset.state === state, kind);
+    const said = await page.locator('#hard-case').innerText();
+    assert.doesNotMatch(said, /NOT finite/);
+    if (kind === 'refused') assert.match(said, /Refused: (not_finite|bad_contact)/);
+  }
+  await page.check('input[name=hard][value=fe]', { force: true });
+  await until(() => document.querySelectorAll('#hard-fe details').length > 15);
+  assert.match(await page.locator('#hard-fe').innerText(), /\d+ variants of \d+ cases/);
+  await page.check('input[name=hard][value=live]', { force: true });
+});
+
+test('a file dropped on the page presses', async () => {
+  await page.evaluate(() => {
+    const corners = [[0, 0, 0], [6, 0, 0], [0, 6, 0], [0, 0, 6]];
+    const faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    const text = `solid x\n${faces.map((face) => `facet outer loop ${face.map((k) => `vertex ${corners[k].join(' ')}`).join(' ')} endloop endfacet`).join('\n')}`;
+    const drop = new DataTransfer();
+    drop.items.add(new File([text], 'corner.stl'));
+    document.dispatchEvent(new DragEvent('drop', { dataTransfer: drop, bubbles: true, cancelable: true }));
+  });
+  await until(() => globalThis.papilla.press.body.hello.triangles?.length === 4);
+  await settled();
+  assert.match(await page.locator('#mesh-note').textContent(), /corner\.stl: 4 triangles; its own size/);
+  const { forceN } = await felt();
+  assert.ok(forceN > 0.001, `${forceN} N`);
+  await chooseRadio('shape', 'plate');
+  await settled();
+});
+
+test('a press is recorded and sent again, and goes into files', async () => {
+  const saved = async (id) => {
+    const [download] = await Promise.all([page.waitForEvent('download'), page.click(`#${id}`)]);
+    return readFile(await download.path());
+  };
+  await page.click('#record');
+  await page.fill('#depth', '0.5');
+  await settled();
+  await page.fill('#depth', '1.2');
+  await settled();
+  await page.click('#record');
+  const depths = await page.evaluate(() => globalThis.papilla.timeline.recorded.map((frame) => frame.depthMm));
+  assert.ok(depths.some((depth) => depth < 0.6) && depths.at(-1) === 1.2, String(depths));
+  const rows = (await saved('save-csv')).toString().trim().split('\n');
+  assert.equal(rows.length, depths.length + 1);
+  assert.match(rows[0], /^ms,u_px,v_px,depth_mm,/);
+  await page.fill('#depth', '2');
+  await settled();
+  await page.click('#play-record');
+  await until(() => globalThis.papilla.control.depthMm < 1.3);
+  await until(() => !globalThis.papilla.timeline.isPlaying && globalThis.papilla.control.depthMm === 2);
+  assert.equal((await saved('save-npy')).subarray(1, 6).toString(), 'NUMPY');
+  assert.equal((await saved('save-png')).subarray(1, 4).toString(), 'PNG');
+});
+
+test('a link holds what is pressed and how it is computed', async () => {
+  await chooseRadio('shape', 'ring');
+  await page.fill('#size', '3');
+  await page.fill('#depth', '0.8');
+  await page.fill('#tilt', '12');
+  const hash = await page.evaluate(() => { const { state } = globalThis.papilla; return new URLSearchParams(state).toString(); });
+  const other = await page.context().newPage();
+  await other.goto(`${BASE}#${hash}`, { timeout: PATIENCE_MS });
+  await other.waitForFunction(() => globalThis.papilla?.session.ready, undefined, { timeout: PATIENCE_MS });
+  const [here, there] = await Promise.all([page, other].map((one) => one.evaluate(() => globalThis.papilla.state)));
+  assert.deepEqual(there, here);
+  assert.deepEqual([there.shape, there.size, there.tilt, there.with], ['ring', 3, '12', 'none']);
+  await other.close();
 });
 
 test('it fits a phone', async () => {

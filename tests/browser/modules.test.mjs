@@ -1,7 +1,7 @@
 // The page's modules without a browser: what they must agree on with the server and with theory.
 
 import assert from 'node:assert/strict';
-import { cp, mkdtemp, rm, writeFile } from 'node:fs/promises';
+import { cp, mkdtemp, readFile, readdir, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
@@ -11,18 +11,27 @@ import { pathToFileURL } from 'node:url';
 const folder = await mkdtemp(join(tmpdir(), 'papilla-page-'));
 after(() => rm(folder, { recursive: true }));
 await cp(new URL('../../server/web/', import.meta.url), folder, { recursive: true });
-await cp(new URL('../../clients/web/src/raster.js', import.meta.url), join(folder, 'raster.js'));
+const client = new URL('../../clients/web/src/', import.meta.url);
+for (const name of await readdir(client)) if (name.endsWith('.js')) await cp(new URL(name, client), join(folder, name));
 await writeFile(join(folder, 'package.json'), '{"type": "module"}');
+// Modules that draw ask for the theme as soon as they are loaded; here nothing is drawn.
+globalThis.matchMedia = () => ({ matches: false, addEventListener: () => {} });
 const load = (name) => import(pathToFileURL(join(folder, name)));
 const { Raster } = await load('raster.js');
 const { countDifferences, fringeOf } = await load('mask.mjs');
 const { HEADER_BYTES, MAP_LEN, RequestFrame, readAnswer } = await load('protocol.mjs');
-const { AutoRange, TABLES, digits, roundUp } = await load('colour.mjs');
+const { AutoRange, TABLES, digits, percentile, roundDown, roundUp } = await load('colour.mjs');
 const { Atlas } = await load('atlas.mjs');
 const { HERTZ, Press } = await load('press.mjs');
 const { poseOf } = await load('contact.mjs');
 const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
+const { OCTAHEDRON, SHAPES, heightsOfMesh, scaled } = await load('shapes.mjs');
+const { meshOf } = await load('mesh.mjs');
+const { bodyMesh, borderOf, nailMesh } = await load('body.mjs');
+const { hashOf, npyOf, pythonOf, stateOf } = await load('share.mjs');
+const { rowsNear } = await load('spikes.mjs');
+const { verdictOf } = await load('hard.mjs');
 const { adviseTier, logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
 
 test('a request frame has the documented bytes', () => {
@@ -44,7 +53,7 @@ test('the pose of a press turns the indenter into the finger, wherever it stands
   for (const [normal, tangent] of [[[0, 0, -1], [1, 0, 0]], [[0, 0, 1], [0, 1, 0]], [[0, -1, 0], [0.6, 0, 0.8]], [[0.48, 0.64, -0.6], [0.8, -0.6, 0]]]) {
     const bitangent = [0, 1, 2].map((k) => normal[(k + 1) % 3] * tangent[(k + 2) % 3] - normal[(k + 2) % 3] * tangent[(k + 1) % 3]);
     const out = new Float32Array(7);
-    poseOf({ shape: 'sphere', radiusMm: 4, heightMm: -0.5, pointMm: [1, 2, 3], normal, tangent, bitangent }, 1, out);
+    poseOf({ body: { faceMm: 4 }, heightMm: -0.5, pointMm: [1, 2, 3], normal, tangent, bitangent }, 1, out);
     const [x, y, z, w] = out.slice(3);
     assert.ok(Math.abs(Math.hypot(x, y, z, w) - 1) < 1e-6, String(out));
     // The rotation's columns are where the shape's axes go: it presses towards +z.
@@ -64,6 +73,9 @@ function answerFrame(status, payload) {
   [0x50, 0x50, 0x4c, 0x31, 3, 2, 0, status].forEach((byte, i) => view.setUint8(i, byte));
   view.setUint32(8, 7, true);
   view.setUint32(24, 1234, true);
+  for (const [at, side] of [[12, 224], [14, 224]]) view.setUint16(at, payload ? side : 0, true);
+  view.setUint32(36, 77, true);
+  view.setUint32(40, 88, true);
   view.setUint16(44, 3, true);
   view.setUint8(46, 1);
   return data;
@@ -76,10 +88,17 @@ test('answers are read, and damaged ones are named', () => {
   assert.equal(readAnswer(data, into).sedJPerM3[1], 2.5);
   assert.deepEqual([into.status, into.sequence, into.serverUs], ['ok', 7, 1234]);
   assert.deepEqual([into.tierNumber, into.outOfRange, into.unfamiliar], [3, true, false]);
+  assert.deepEqual([into.queueUs, into.networkUs, into.bytes], [77, 88, HEADER_BYTES + 4 * MAP_LEN]);
   assert.equal(readAnswer(answerFrame(1, 0), into).status, 'superseded');
   assert.equal(readAnswer(answerFrame(2, 0), into).status, 'late');
   assert.equal(into.sedJPerM3, null);
-  assert.throws(() => readAnswer(answerFrame(0, 0), into), /not an f32 map/);
+  const wrong = answerFrame(0, 8);
+  assert.throws(() => readAnswer(wrong, into), /not an f32 map/);
+  const cut = answerFrame(0, 4 * 6);
+  [[12, 3], [14, 2], [32, 221], [34, 7]].forEach(([place, value]) => new DataView(cut).setUint16(place, value, true));
+  new DataView(cut).setFloat32(HEADER_BYTES + 4 * 5, 9.5, true);
+  const { sedJPerM3 } = readAnswer(cut, into);
+  assert.deepEqual([sedJPerM3.length, sedJPerM3[8 * 224 + 223], sedJPerM3[0]], [MAP_LEN, 9.5, 0], 'a window is a whole map, 0 outside');
   assert.throws(() => readAnswer(new ArrayBuffer(31), into), /31 bytes/);
   const other = answerFrame(0, 0);
   new DataView(other).setUint8(0, 0);
@@ -141,15 +160,33 @@ test('colour tables begin and end where the published maps do', () => {
   near('inferno', 255, [252, 255, 164]);
 });
 
-test('scales are round, grow at once and shrink late', () => {
+test('scales are round, grow at once, and shrink late and step by step, unless they are locked', () => {
   assert.deepEqual([0.7, 1, 1.01, 2400, 9e4].map(roundUp), [0.8, 1, 1.5, 3000, 1e5]);
-  const range = new AutoRange(1, 1000);
+  assert.deepEqual([80, 15, 10, 1].map((value) => Number(roundDown(value).toPrecision(6))), [60, 10, 8, 0.8]);
+  const range = new AutoRange(1, 1000, 500);
   assert.equal(range.update(70, 0), true);
   assert.equal(range.max, 80);
   assert.equal(range.update(10, 500), false);
-  assert.equal(range.update(10, 1100), true);
-  assert.equal(range.max, 10);
+  assert.equal(range.update(79, 1400), false, 'one high frame holds it');
+  assert.equal(range.update(10, 1500), false);
+  assert.equal(range.update(10, 2400), false);
+  assert.deepEqual([range.update(10, 2500), range.max], [true, 60]);
+  assert.equal(range.update(10, 2900), false);
+  assert.deepEqual([range.update(10, 3000), range.max], [true, 50]);
+  range.locked = true;
+  assert.equal(range.update(1000, 3100), false);
+  assert.equal(range.max, 50);
   assert.deepEqual([digits(0), digits(3.14159), digits(31.4), digits(0.001234)], ['0', '3.14', '31.4', '0.00123']);
+});
+
+test('one bright line at the edge does not take the scale', () => {
+  const values = new Float32Array(MAP_LEN);
+  const pixels = Uint32Array.from({ length: MAP_LEN }, (_, i) => i);
+  for (let i = 0; i < 5000; i++) values[i] = 1 + i / 5000;
+  for (let i = 5000; i < 5050; i++) values[i] = 40;
+  const most = percentile(values, pixels, 40, 0.98);
+  assert.ok(most > 1.9 && most < 2.1, `${most}`);
+  assert.equal(percentile(new Float32Array(MAP_LEN), pixels, 0, 0.98), 0);
 });
 
 test('percentiles are nearest ranks of the last 240 values', () => {
@@ -227,12 +264,17 @@ test('error figures follow their definitions', () => {
   near(figures.energy, 1 / 14.5);
 });
 
-test('a tier that is late makes way for the most accurate that is in time', () => {
-  const tier = (name, ms, error, more = {}) => ({ name, predicted_latency_us: 1000 * ms, relative_l2_median: error, for_comparison: false, ...more });
-  const tiers = [tier('form', 0.2, 0.5), tier('nano', 1, 0.14), tier('small', 4, 0.12), tier('unet', 3, 0.1, { for_comparison: true }), tier('large', 20, 0.1)];
-  for (const [late, budgetMs, advised] of [['large', 11, 'small'], ['large', 2, 'nano'], ['small', 0.5, 'form'], ['large', 0.1, 'form'], ['form', 0.1, undefined]]) {
-    assert.equal(adviseTier(tiers, late, budgetMs), advised, `${late} within ${budgetMs} ms`);
-  }
+test('where frames are late the most accurate network within the budget is advised, and never a closed form', () => {
+  const tier = (name, ms, error, more = {}) => ({ name, kind: 'network', predicted_latency_us: 1000 * ms, relative_l2_median: error, named_only: null, ...more });
+  const method = (name, ms, error) => ({ name, contact_us: 1000 * ms, errors: [{ pressure_relative_l2: { median: error } }] });
+  const tiers = [tier('form', 0.2, 0.5, { kind: 'closed_form' }), tier('nano', 1, 0.14), tier('small', 4, 0.12), tier('unet', 3, 0.1, { named_only: 'outdone' }), tier('large', 20, 0.1)];
+  const methods = [method('springs', 0.1, 0.4), method('pixels', 8, 0.08)];
+  const of = (budgetMs, isContact) => adviseTier({ tiers, methods }, { tier: 'large', method: 'pixels', budgetMs, isContact });
+  assert.deepEqual([of(11, false).tier, of(2, false).tier], ['small', 'nano']);
+  assert.match(of(0.5, false).text, /^no model is that fast here; the fastest, nano, takes some 1 ms$/);
+  assert.deepEqual([of(13, true).tier, of(13, true).method], ['small', 'pixels']);
+  assert.deepEqual([of(5, true).tier, of(5, true).method], ['small', 'springs']);
+  assert.match(of(1, true).text, /the fastest, nano with contact springs, takes some 1.1 ms$/);
 });
 
 /** What /v1/tiers answers, in small. */
@@ -285,4 +327,104 @@ test('axes hold their values and numbers, names keep clear of each other', () =>
   const found = places.filter((place) => place !== null);
   assert.ok(found.length > 3 && found.length < 40, `${found.length} names round one dot`);
   assert.equal(new Set(found.map(String)).size, found.length);
+});
+
+test('every shape presses with the point its pose names, and is drawn as it is sent', () => {
+  for (const [name, { size, make }] of Object.entries(SHAPES)) {
+    for (const mm of size ? [size[1], size[3], size[2]] : [0]) {
+      const { hello, faceMm, profile, halfMm } = make(mm);
+      let least = Infinity;
+      for (let i = 0; i <= 200; i++) for (let j = 0; j <= 200; j++) least = Math.min(least, profile((i / 100 - 1) * halfMm * 0.999, (j / 100 - 1) * halfMm * 0.999));
+      assert.ok(least >= -1e-9 && least < 0.35, `${name} of ${mm}: its surface comes to ${least} mm from its face`);
+      assert.ok(Number.isFinite(faceMm) && hello.shape === name, name);
+      assert.ok(profile(3 * halfMm, 0) > 6 && profile(0, 3 * halfMm) > 6, `${name}: beside it there is nothing`);
+    }
+  }
+  const { heights, columns, sideMm } = heightsOfMesh(scaled(OCTAHEDRON, 8));
+  assert.ok(Math.abs(heights[48 * columns + 48] - 4) < 1e-6 && sideMm === 8, 'the tip of an octahedron stands over its middle');
+});
+
+/** A binary STL of a tetrahedron. */
+function stl(corners) {
+  const data = new ArrayBuffer(84 + 50 * corners.length);
+  const view = new DataView(data);
+  view.setUint32(80, corners.length, true);
+  corners.forEach((facet, n) => facet.flat().forEach((x, k) => view.setFloat32(84 + 50 * n + 12 + 4 * k, x, true)));
+  return data;
+}
+
+test('an STL and a GLB of one body are one mesh, and what is none says so', () => {
+  const points = [[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]];
+  const faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+  const mesh = meshOf(stl(faces.map((face) => face.map((k) => points[k]))), 'body.stl');
+  assert.deepEqual([mesh.vertices_mm.length, mesh.triangles.length, mesh.sideMm], [4, 4, 10]);
+  const text = `solid x\n${faces.map((face) => `facet normal 0 0 0 outer loop ${face.map((k) => `vertex ${points[k].join(' ')}`).join(' ')} endloop endfacet`).join('\n')}\nendsolid`;
+  assert.deepEqual(meshOf(new TextEncoder().encode(text).buffer, 'body.STL').triangles, mesh.triangles);
+  // The same in metres, moved by its node and indexed.
+  const bin = new ArrayBuffer(48 + 24);
+  new Float32Array(bin, 0, 12).set(points.flat().map((x) => x / 1000));
+  new Uint16Array(bin, 48, 12).set(faces.flat());
+  const json = JSON.stringify({
+    scenes: [{ nodes: [0] }], nodes: [{ mesh: 0, translation: [1, 2, 3] }], meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1 }] }],
+    accessors: [{ bufferView: 0, componentType: 5126, count: 4, type: 'VEC3' }, { bufferView: 1, componentType: 5123, count: 12, type: 'SCALAR' }],
+    bufferViews: [{ buffer: 0, byteLength: 48 }, { buffer: 0, byteOffset: 48, byteLength: 24 }], buffers: [{ byteLength: 72 }],
+  }).padEnd(800);
+  const glb = new ArrayBuffer(12 + 8 + json.length + 8 + 72);
+  const view = new DataView(glb);
+  [0x46546c67, 2, glb.byteLength, json.length, 0x4e4f534a].forEach((word, k) => view.setUint32(4 * k, word, true));
+  new Uint8Array(glb, 20).set(new TextEncoder().encode(json));
+  view.setUint32(20 + json.length, 72, true);
+  view.setUint32(24 + json.length, 0x004e4942, true);
+  new Uint8Array(glb, 28 + json.length).set(new Uint8Array(bin));
+  const other = meshOf(glb, 'body.glb');
+  assert.deepEqual(other.triangles, mesh.triangles);
+  other.vertices_mm.flat().forEach((x, k) => assert.ok(Math.abs(x - mesh.vertices_mm.flat()[k]) < 1e-3, `${x}`));
+  assert.throws(() => meshOf(new ArrayBuffer(10), 'notes.txt'), /neither an STL nor a GLB/);
+  assert.throws(() => meshOf(new ArrayBuffer(10), 'empty.stl'), /no triangle/);
+  assert.throws(() => meshOf(stl(Array(16385).fill([[0, 0, 0], [1, 0, 0], [0, 1, 0]])), 'large.stl'), /16385 triangles; a mesh may have 16384/);
+});
+
+test('the finger is closed around its patch, and its nail lies on the nail side', () => {
+  const atlas = sphereAtlas(8);
+  const border = borderOf(atlas.triangles);
+  assert.equal(border.length, 72, 'the border of the cap is its last ring');
+  const nail = nailMesh();
+  for (let k = 0; k < nail.length; k += 6) assert.ok(nail[k + 2] > 0 && nail.slice(k, k + 6).every(Number.isFinite), 'the nail faces +z');
+  assert.ok(bodyMesh(atlas).every(Number.isFinite));
+});
+
+test('a link holds its state, and arrays are those of NumPy', () => {
+  const state = { shape: 'ring', size: 4.5, effects: 'spikes points', tier: '' };
+  assert.deepEqual(stateOf(hashOf(state)), { shape: 'ring', size: '4.5', effects: 'spikes points' });
+  const map = Float32Array.from({ length: MAP_LEN }, (_, i) => i);
+  const bytes = npyOf([map, map], 224);
+  const length = new DataView(bytes.buffer).getUint16(8, true);
+  assert.equal((10 + length) % 64, 0);
+  assert.match(new TextDecoder('latin1').decode(bytes.slice(0, 10 + length)), /^\x93NUMPY\x01\x00..\{'descr': '<f4', 'fortran_order': False, 'shape': \(2, 224, 224\), \} *\n$/s);
+  assert.equal(new DataView(bytes.buffer).getFloat32(10 + length + 4 * (MAP_LEN + 7), true), 7);
+  const program = pythonOf({ origin: 'http://127.0.0.1:7224', terms: { tier: 'small', effects: [], objects: [{ shape: { shape: 'sphere', radius_mm: 4 } }], map: true, method: null }, pose: [1, 2, 3, 0, 0, 0, 1] });
+  assert.match(program, /objects=\[\{"shape": \{"shape": "sphere", "radius_mm": 4\}\}\],/);
+  assert.match(program, /map=True,/);
+  assert.doesNotMatch(program, /effects|method/);
+});
+
+test('a fibre keeps its row, the nearest of its class on top', () => {
+  const units = [['ra', 0], ['sa1', 50], ['sa1', 10], ['pc', 0], ['sa1', 30]].map(([name, u]) => ({ class: name, px: [u, 0] }));
+  assert.deepEqual([...rowsNear(units, [11, 0])], [0, 2, 0, 0, 1]);
+  const many = Array.from({ length: 100 }, (_, k) => ({ class: 'sa1', px: [k, 0] }));
+  assert.equal([...rowsNear(many, [0, 0])].filter((row) => row >= 0).length, 16);
+});
+
+test('what came of a hard case is told as it is', () => {
+  const plain = { status: 'ok', outOfRange: false, unfamiliar: false, unsettled: false, cutOff: false, coarseClock: false, noContact: false };
+  assert.deepEqual(verdictOf({ problem: { code: 'not_finite', message: 'NaN' }, warnings: [] }, 1).kind, 'refused');
+  assert.equal(verdictOf({ answer: { ...plain, unfamiliar: true }, warnings: [] }, 1).kind, 'flagged');
+  assert.equal(verdictOf({ answer: plain, warnings: [{ question: 'was m meant?' }] }, 1).kind, 'flagged');
+  assert.equal(verdictOf({ answer: plain, warnings: [] }, 1).kind, 'plain');
+  assert.equal(verdictOf({ answer: { ...plain, status: 'late' }, warnings: [] }, 1).kind, 'refused');
+});
+
+test('the hard cases of the finite elements are those of the report', async () => {
+  const { fileOf } = await import('./stability.mjs');
+  assert.equal(await readFile(new URL('../../server/web/stability.json', import.meta.url), 'utf8'), await fileOf(), 'write it anew: node tests/browser/stability.mjs');
 });

@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { BASE, MAP_LEN, fetchMap, largest, launch, placeOfPeak, postPressure } from './browser.mjs';
+import { BASE, MAP_LEN, fetchMap, largest, launch, placeOfPeak, postPressure, watchSockets } from './browser.mjs';
 
 // Software rendering on a busy machine is slow; nothing here is about speed.
 const PATIENCE_MS = 90000;
@@ -18,6 +18,7 @@ before(async () => {
   page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
   page.on('pageerror', (error) => complaints.push(String(error)));
   page.on('requestfailed', (request) => complaints.push(`${request.url()}: ${request.failure()?.errorText}`));
+  await watchSockets(page);
   await page.goto(BASE, { timeout: PATIENCE_MS });
   shots = process.env.PAPILLA_SHOTS;
 });
@@ -193,13 +194,13 @@ test('the keyboard moves, deepens and lifts the indenter', async () => {
 
 test('the indenter shapes press differently', async () => {
   const areas = {};
-  for (const shape of ['sphere', 'edge', 'plate']) {
+  for (const shape of ['sphere', 'cylinder', 'plate']) {
     await chooseRadio('shape', shape);
     await settled();
-    assert.equal(await page.locator('#radius').isVisible(), shape !== 'plate');
+    assert.equal(await page.locator('#size').isVisible(), shape !== 'plate');
     areas[shape] = await page.evaluate(() => globalThis.papilla.press.areaMm2);
   }
-  assert.ok(areas.sphere > 0 && areas.sphere < areas.edge && areas.edge < areas.plate, JSON.stringify(areas));
+  assert.ok(areas.sphere > 0 && areas.sphere < areas.cylinder && areas.cylinder < areas.plate, JSON.stringify(areas));
 });
 
 test('spikes of the touch units are drawn while they are asked for', async () => {
@@ -207,7 +208,7 @@ test('spikes of the touch units are drawn while they are asked for', async () =>
   // A late answer carries no spikes: whether a busy machine is in time is not asked here.
   await page.selectOption('#budget', '500000');
   await until(() => globalThis.papilla?.session.ready?.session_effects.length === 0);
-  await page.check('#spikes-on');
+  await page.check('#effect-spikes');
   await until(() => globalThis.papilla.session.ready?.units);
   await page.fill('#depth', '0.2');
   await settled();
@@ -219,20 +220,23 @@ test('spikes of the touch units are drawn while they are asked for', async () =>
     await page.setViewportSize({ width, height: 900 });
     await page.fill('#depth', width === 390 ? '0.5' : '1.5');
     await settled();
-    const { drawn, wide } = await page.evaluate(() => {
+    const { drawn, marks, wide } = await page.evaluate(() => {
       const canvas = document.getElementById('spike-plot');
       // Read from a copy: the browser warns of a canvas that is read again and again.
       const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
       copy.drawImage(canvas, 0, 0);
       const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
       const drawn = data.filter((value, at) => at % 4 === 3 && value > 0).length;
-      return { drawn, wide: document.documentElement.scrollWidth - window.innerWidth };
+      const { spikes } = globalThis.papilla;
+      const marks = spikes.atMs.filter((ms, n) => ms > -Infinity && spikes.rows[spikes.unitOf[n]] >= 0).length;
+      return { drawn, marks, wide: document.documentElement.scrollWidth - window.innerWidth };
     });
+    assert.ok(marks > 0, 'fibres near the press have fired');
     assert.ok(drawn > 0 && wide <= 0, `${drawn} pixels drawn at ${width} px, page ${wide} px too wide`);
     await keep(`spikes-${width}`);
   }
   await page.setViewportSize({ width: 1440, height: 900 });
-  await page.uncheck('#spikes-on');
+  await page.uncheck('#effect-spikes');
   await page.selectOption('#budget', '50000');
   await until(() => globalThis.papilla.session.ready && !globalThis.papilla.session.ready.units);
   assert.equal(await page.locator('#spikes').isVisible(), false);
@@ -253,7 +257,7 @@ test('replay shows the error against the FE truth', async () => {
   await page.waitForTimeout(600);
   // The same figure by another road: maps rasterised by the server, posted over HTTP.
   const [pressure, truth] = await Promise.all([fetchMap(`v1/presses/${last}/pressure`), fetchMap(`v1/presses/${last}/sed`)]);
-  const network = await postPressure(pressure, await text('tier-name'));
+  const network = await postPressure(pressure, await page.locator('#tier-name').getAttribute('data-tier'));
   let [error, size] = [0, 0];
   for (let i = 0; i < MAP_LEN; i++) {
     error += (network[i] - truth[i]) ** 2;
@@ -263,7 +267,7 @@ test('replay shows the error against the FE truth', async () => {
   assert.ok(percent > 0);
   const shown = Number((await text('error-l2')).replace(' %', ''));
   assert.ok(Math.abs(shown - percent) <= (percent < 10 ? 0.006 : 0.06), `shown ${shown} %, recomputed ${percent} %`);
-  for (const figure of ['truth', 'difference']) {
+  for (const figure of ['other', 'difference']) {
     assert.ok(new Set(await pixels(figure)).size > 10, `${figure} is painted`);
   }
   await keep('replay-light');
@@ -278,7 +282,7 @@ test('the tier can be chosen', async () => {
   const peaks = new Set();
   for (const { name } of tiers) {
     await page.selectOption('#tier', name);
-    await until((wanted) => document.getElementById('tier-name').textContent === wanted, name);
+    await until((wanted) => document.getElementById('tier-name').dataset.tier === wanted, name);
     await nextAnswer();
     peaks.add(largest((await answered()).sedJPerM3));
   }
@@ -293,12 +297,12 @@ test('the ladder marks the running rung, and a click on another switches in the 
   await page.locator('.ladder').scrollIntoViewIfNeeded();
   for (const { name } of tiers) {
     await page.evaluate((tier) => document.querySelector(`#ladder-plot [data-tier="${tier}"]`).dispatchEvent(new MouseEvent('click')), name);
-    await until((wanted) => document.getElementById('tier-name').textContent === wanted, name);
+    await until((wanted) => document.getElementById('tier-name').dataset.tier === wanted, name);
     await nextAnswer();
     assert.equal(await page.locator('#tier').inputValue(), name);
     assert.equal(await page.locator('#ladder-plot .ring').count(), 1);
     assert.equal(await page.locator('#ladder-plot [aria-pressed=true]').getAttribute('data-tier'), name);
-    await until((wanted) => document.getElementById('ladder-now').textContent.startsWith(`${wanted}: `), name);
+    await until(() => / off on /.test(document.getElementById('ladder-now').textContent));
     await until(() => /now [\d.]+ m?s in the server/.test(document.getElementById('ladder-now').textContent));
   }
   assert.equal(await page.evaluate(() => globalThis.papilla.session.ready.session), session, 'no new connection');
@@ -310,7 +314,7 @@ test('the ladder marks the running rung, and a click on another switches in the 
     const name = await other.getAttribute('data-tier');
     await other.focus();
     await page.keyboard.press('Enter');
-    await until((wanted) => document.getElementById('tier-name').textContent === wanted, name);
+    await until((wanted) => document.getElementById('tier-name').dataset.tier === wanted, name);
     await nextAnswer();
   }
   await keep('ladder-light');
@@ -323,7 +327,7 @@ test('a budget too small for the tier is shown as late frames, not as an old map
   await page.selectOption('#tier', slowest.name);
   await page.selectOption('#budget', '5500');
   await until(() => Number(document.getElementById('count-late').textContent) > 5);
-  await until(() => /needs more than 5.5 ms: raise the budget or take \S+$/.test(document.getElementById('stale').textContent));
+  await until(() => /needs more than 5.5 ms here: (raise the budget or take \S+|no model is that fast here; the fastest, \S+, takes some [\d.]+ ms)$/.test(document.getElementById('stale').textContent));
   assert.ok(await page.locator('#stale').isVisible(), 'the old map is marked');
   await page.selectOption('#budget', '500000');
   await nextAnswer();
@@ -331,27 +335,22 @@ test('a budget too small for the tier is shown as late frames, not as an old map
 });
 
 test('a lost connection comes back by itself', async () => {
-  await page.evaluate(() => {
-    globalThis.lost = globalThis.papilla.session.socket;
-    globalThis.lost.close();
+  const opened = await page.evaluate(() => {
+    for (const socket of globalThis.sockets) socket.close();
+    return globalThis.sockets.length;
   });
-  await until(() => {
-    const { socket } = globalThis.papilla.session;
-    return socket && socket !== globalThis.lost && document.getElementById('state').dataset.state === 'ready';
-  });
+  await until((before) => globalThis.sockets.length > before && document.getElementById('state').dataset.state === 'ready', opened);
   await nextAnswer();
   await until(() => !document.getElementById('sed').classList.contains('stale'));
 });
 
 test('a server that says nothing is given up and found again', async () => {
-  await page.evaluate(() => {
-    globalThis.lost = globalThis.papilla.session.socket;
+  const opened = await page.evaluate(() => {
     // Frames leave and no answer comes, as of a server that stands still.
-    globalThis.lost.send = () => {};
+    for (const socket of globalThis.sockets) socket.send = () => {};
+    return globalThis.sockets.length;
   });
-  await until(() => /silent/.test(document.getElementById('state-text').textContent)
-    || globalThis.papilla.session.socket !== globalThis.lost);
-  await until(() => globalThis.papilla.session.socket !== globalThis.lost && globalThis.papilla.session.ready);
+  await until((before) => globalThis.sockets.length > before && globalThis.papilla.session.ready, opened);
   await nextAnswer();
 });
 
@@ -361,14 +360,14 @@ test('a press beyond what the network learnt says so', async () => {
   await page.selectOption('#tier', 'half-space');
   await page.evaluate(() => globalThis.papilla.press.moveToPixel(112, 112));
   await chooseRadio('shape', 'sphere');
-  await page.fill('#radius', '1.5');
+  await page.fill('#size', '1.5');
   await page.fill('#depth', '2');
   await settled();
   assert.ok(largest((await answered()).pressurePa) > 48200);
   await until(() => /harder than any press it learnt: it saw 48 kPa/.test(document.getElementById('flags').textContent));
   assert.ok(await page.locator('#flags').isVisible());
   await page.fill('#depth', '0.5');
-  await page.fill('#radius', '10');
+  await page.fill('#size', '10');
   await settled();
   await until(() => document.getElementById('flags').hidden);
   await page.fill('#depth', '1');
@@ -443,6 +442,42 @@ test('the page fits a phone and follows the dark theme', async () => {
   const mark = await page.evaluate(() => Array.from(globalThis.papilla.press.uvPx));
   assert.ok(Math.hypot(mark[0] - column - 0.5, mark[1] - row - 0.5) < 3, `pressed at ${mark}`);
   await keep('press-dark-phone');
+});
+
+test('until the first answer the pictures say that they load, and nobody is asked to drag', async () => {
+  const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
+  const slow = await context.newPage();
+  await slow.route('**/v1/atlas', async () => {});
+  await slow.goto(BASE, { timeout: PATIENCE_MS });
+  assert.equal(await slow.locator('.drag-hint').isVisible(), false);
+  assert.match(await slow.evaluate(() => getComputedStyle(document.querySelector('#pressure .stack'), '::after').content), /loading/);
+  await context.close();
+});
+
+test('where a token is due, there is a field for it', async () => {
+  const context = await browser.newContext();
+  const guest = await context.newPage();
+  await guest.route('**/v1/atlas', (route) => route.fulfill({ status: 401, json: { error: { code: 'unauthorised', message: 'a token is due' } } }));
+  await guest.goto(BASE, { timeout: PATIENCE_MS });
+  await guest.fill('#token-text', 'open sesame');
+  // The service takes the token of the address and gives the browser a cookie instead.
+  const [request] = await Promise.all([guest.waitForRequest((asked) => asked.url().includes('access_token=')), guest.click('#token button')]);
+  assert.equal(new URL(request.url()).searchParams.get('access_token'), 'open sesame');
+  assert.equal(new URL(request.url()).pathname, new URL(BASE).pathname);
+  await context.close();
+});
+
+test('light and dark can be chosen, and the choice is kept', async () => {
+  await page.emulateMedia({ colorScheme: 'light' });
+  const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const light = await background();
+  await page.click('#theme');
+  assert.notEqual(await background(), light);
+  await page.reload();
+  await until(() => globalThis.papilla?.session.ready);
+  assert.notEqual(await background(), light);
+  await page.click('#theme');
+  assert.equal(await background(), light);
 });
 
 test('nothing was complained about', () => {

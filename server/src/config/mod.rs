@@ -158,8 +158,8 @@ pub struct Config {
     #[arg(long, env = "PAPILLA_ALLOW_ORIGIN", value_name = "ORIGIN", value_delimiter = ',')]
     pub allow_origin: Vec<String>,
 
-    /// Folder whose files are served at /xr, with an index.html: the WebXR scene that `npm run build`
-    /// makes in clients/web.
+    /// Folder whose files are served at /xr in place of the WebXR scene in the binary; with an
+    /// index.html, as `npm run build` makes it in clients/web.
     #[arg(long, env = "PAPILLA_XR_DIR", value_name = "DIR")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub xr_dir: Option<PathBuf>,

@@ -96,15 +96,14 @@ pub(crate) fn list() -> Vec<(String, String)> {
     list.map(|(method, path, _)| (method.as_str().to_ascii_lowercase(), path.to_owned())).collect()
 }
 
-/// The whole router. Pages of `origins` may read its answers; the files of `xr_dir` are at `/xr`.
+/// The whole router. Pages of `origins` may read its answers; at `/xr` are the files of `xr_dir`, or
+/// the scene in the binary.
 pub(crate) fn router(app: Arc<App>, origins: &[String], xr_dir: Option<&Path>) -> Router {
     let mut router = Router::new();
     for (_, path, handler) in routes() {
         router = router.route(path, handler);
     }
-    if let Some(folder) = xr_dir {
-        router = router.merge(xr::routes(folder));
-    }
+    router = router.merge(xr::routes(xr_dir));
     let guard = from_fn_with_state(Arc::clone(&app), guard);
     let router = router
         .fallback(not_found)

@@ -41,9 +41,20 @@ async fn a_folder_is_served_at_xr_and_nothing_outside_of_it() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn without_a_folder_there_is_nothing_at_xr() {
+async fn without_a_folder_the_scene_of_the_binary_is_at_xr() {
     let service = Service::start().await;
-    for path in ["/xr/", "/xr/index.html"] {
+    let bare = service.get("/xr").send().await;
+    assert_eq!((bare.status, bare.header("location")), (308, Some("xr/")));
+    let page = service.get("/xr/").send().await;
+    assert_eq!((page.status, page.header("content-type")), (200, Some("text/html; charset=utf-8")));
+    assert!(page.header("etag").is_some());
+    let script = service.get("/xr/scene.js").send().await;
+    assert_eq!(script.header("content-type"), Some("text/javascript; charset=utf-8"));
+    assert!(script.body.len() > 100_000, "{} bytes", script.body.len());
+    // Of the page's own files there are none below, and the other way round.
+    for path in
+        ["/xr/papilla.mjs", "/xr/nothing.js", "/xr/../index.html", "/xr//scene.js", "/scene.js"]
+    {
         service.get(path).send().await.assert_refused(404, "not_found");
     }
 }

@@ -19,6 +19,9 @@ use crate::{
 /// The files of the page, as they were when the binary was built.
 const PAGE: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 
+/// The WebXR scene: what `npm run build` in `clients/web` makes, as it was committed.
+const SCENE: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/scene.rs"));
+
 /// The description of the HTTP surface, written by hand.
 const OPENAPI: &str = include_str!("../../../openapi.json");
 
@@ -27,6 +30,8 @@ const OPENAPI: &str = include_str!("../../../openapi.json");
 enum Part {
     /// A file of the page, by its place.
     File(usize),
+    /// A file of the scene, likewise.
+    Scene(usize),
     OpenApi,
 }
 
@@ -44,16 +49,24 @@ fn content_type(name: &str) -> &'static str {
         "webp" => "image/webp",
         "ico" => "image/x-icon",
         "woff2" => "font/woff2",
+        "txt" => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     }
 }
 
 pub(crate) async fn index(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, "index.html", &headers).await
+    serve(&app, PAGE, Part::File, "index.html", &headers).await
 }
 
 pub(crate) async fn file(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    serve(&app, uri.path().trim_start_matches('/'), &headers).await
+    serve(&app, PAGE, Part::File, uri.path().trim_start_matches('/'), &headers).await
+}
+
+/// A file of the scene, `/xr/` for its page.
+pub(crate) async fn scene(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+    let name = uri.path().trim_start_matches("/xr/");
+    let name = if name.is_empty() { "index.html" } else { name };
+    serve(&app, SCENE, Part::Scene, name, &headers).await
 }
 
 /// The description of the HTTP surface.
@@ -62,12 +75,18 @@ pub(crate) async fn openapi(State(app): Shared, headers: HeaderMap) -> Answer {
     cached(&CACHE, &headers, Part::OpenApi, make).await.or_else(|problem| refuse(&app, problem))
 }
 
-async fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
-    let Some(place) = PAGE.iter().position(|(file, _)| *file == name) else {
-        let message = format!("there is nothing at /{}", shortened(name));
+async fn serve(
+    app: &App,
+    files: &'static [(&str, &[u8])],
+    part: fn(usize) -> Part,
+    name: &str,
+    headers: &HeaderMap,
+) -> Answer {
+    let Some(place) = files.iter().position(|(file, _)| *file == name) else {
+        let message = format!("there is no file {}", shortened(name));
         return refuse(app, Problem::new(ErrorCode::NotFound, message));
     };
-    let (name, bytes) = PAGE[place];
+    let (name, bytes) = files[place];
     let make = move || Ok(Content::new(content_type(name), bytes));
-    cached(&CACHE, headers, Part::File(place), make).await.or_else(|problem| refuse(app, problem))
+    cached(&CACHE, headers, part(place), make).await.or_else(|problem| refuse(app, problem))
 }

@@ -1,7 +1,6 @@
-//! `/xr`: the files of a folder, for a page that is built elsewhere (`clients/web`, `npm run
-//! build`).
+//! `/xr`: the WebXR scene that is in the binary, or the files of a folder in its place.
 //!
-//! Not in the list of routes: without a folder there is nothing there.
+//! Not in the list of routes: which files there are depends on the folder.
 
 use std::{io::ErrorKind, path::Path, sync::Arc};
 
@@ -20,17 +19,23 @@ use crate::{
     transport::{
         answer::{Shared, refuse},
         app::App,
+        http::page,
     },
 };
 
-/// What a folder adds to the routes; none of it asks for a token, as the page does not.
+/// What this adds to the routes; none of it asks for a token, as the page does not.
 pub(crate) const PATHS: [&str; 3] = ["/xr", "/xr/", "/xr/{*path}"];
 
-/// The routes that serve `folder`. `ServeDir` refuses paths that lead out of it (`..`, roots, drive
-/// names).
-pub(crate) fn routes(folder: &Path) -> Router<Arc<App>> {
-    let files = ServeDir::new(folder);
-    let serve = get(move |state: Shared, request: Request| file(files, state, request));
+/// The routes that serve `folder`, or the scene in the binary. `ServeDir` refuses paths that lead out
+/// of a folder (`..`, roots, drive names).
+pub(crate) fn routes(folder: Option<&Path>) -> Router<Arc<App>> {
+    let serve = match folder {
+        Some(folder) => {
+            let files = ServeDir::new(folder);
+            get(move |state: Shared, request: Request| file(files, state, request))
+        }
+        None => get(page::scene),
+    };
     let [bare, index, below] = PATHS;
     Router::new()
         // Without the slash the page's relative addresses would miss the folder. The redirect is

@@ -1,0 +1,81 @@
+// The other way: a second model or contact method on the same contact, in a session of its own. A model
+// gets the very pressure that the first session found; a method gets the same pose.
+
+import { MAP_LEN, Session, sessionUrl } from './protocol.mjs';
+import { median } from './effects.mjs';
+
+const KEPT = 30;
+/** The second answer may take its time: the first session watches the server. */
+const SILENT_MS = 10000;
+
+/** |a - b| / |b| over the pixels. */
+export function relativeL2(a, b, pixels) {
+  let [error, size] = [0, 0];
+  for (let n = 0; n < pixels.length; n++) {
+    error += (a[pixels[n]] - b[pixels[n]]) ** 2;
+    size += b[pixels[n]] ** 2;
+  }
+  return size > 0 ? Math.sqrt(error / size) : NaN;
+}
+
+/** A pair of answers to one contact. */
+export class Comparison {
+  /** `onpair(first, second, answer)` is called with two SED maps of one contact. */
+  constructor(onpair, onfault) {
+    this.onpair = onpair;
+    this.onfault = onfault;
+    this.session = null;
+    this.with = '';
+    /** What the answer that is due is to be held against. */
+    this.first = new Float32Array(MAP_LEN);
+    this.serverMs = [];
+    this.waits = false;
+  }
+
+  get isOn() {
+    return this.with !== '';
+  }
+
+  get isMethod() {
+    return this.with.startsWith('method:');
+  }
+
+  /** Compares with `tier:NAME` or `method:NAME` from now on; '' ends it. */
+  choose(what, hello) {
+    this.with = what;
+    this.serverMs = [];
+    if (what === '') {
+      this.session?.close();
+      this.session = null;
+      return;
+    }
+    this.session ??= new Session(sessionUrl(), {
+      onstate: () => {},
+      onready: () => { this.serverMs = []; },
+      onanswer: (answer) => this.#answer(answer),
+      onfault: (code, message) => this.onfault(message),
+    }, SILENT_MS);
+    this.session.open(hello);
+  }
+
+  /** Offers a contact that was answered; it is taken if none is on its way. `pose` is where the indenter was. */
+  offer(pressurePa, sedJPerM3, pose, nowMs) {
+    const { session } = this;
+    if (!session?.ready || session.inFlight) return;
+    const frame = this.isMethod ? session.poseFrame : session.mapFrame;
+    frame.values.set(this.isMethod ? pose : pressurePa);
+    if (session.send(nowMs, frame)) this.first.set(sedJPerM3);
+  }
+
+  #answer(answer) {
+    if (answer.status !== 'ok') return;
+    this.serverMs.push((answer.serverUs - answer.queueUs) / 1000);
+    if (this.serverMs.length > KEPT) this.serverMs.shift();
+    this.onpair(this.first, answer.sedJPerM3, answer);
+  }
+
+  /** Median time in the server without waiting, ms. */
+  get medianMs() {
+    return median(this.serverMs);
+  }
+}

@@ -1,0 +1,198 @@
+// Effects as switches: what each costs on this machine, what it changed just now, and where the time
+// of a frame goes. What is not switched on is not computed: the frame's own timings show it.
+
+import { digits } from './colour.mjs';
+import { EFFECTS } from './words.mjs';
+
+const WINDOW = 40;
+/** So many answers under new terms are compared with as many under the old ones. */
+const ENOUGH = 12;
+const REFRESH_MS = 300;
+const PARTS = [['wait', 'waited for a thread'], ['solve', 'contact'], ['infer', 'network'], ['rest', 'effects, coding']];
+/** Where the electrodes of the example are, px. */
+const GRID = [80, 101, 122, 143];
+/** These exclude each other (docs/reference/protocol-effects.md). */
+const EXCLUDES = { relaxation: 'shear_energy', shear_energy: 'relaxation' };
+
+const byId = (id) => document.getElementById(id);
+const ms = (us) => (us > 0 && us < 10 ? '< 0.01' : (us / 1000).toFixed(us < 9995 ? 2 : 1));
+
+/** Median of the last values. */
+export function median(values) {
+  const sorted = Float64Array.from(values).sort();
+  return sorted.length ? sorted[Math.floor(sorted.length / 2)] : NaN;
+}
+
+/** The last answers' times under the same terms. */
+class Recent {
+  constructor() {
+    this.parts = { wait: [], solve: [], infer: [], rest: [] };
+    this.bytes = 0;
+    this.peak = [];
+  }
+
+  push(answer, peak) {
+    const rest = answer.serverUs - answer.queueUs - answer.networkUs - answer.solveUs;
+    const values = { wait: answer.queueUs, solve: answer.solveUs, infer: answer.networkUs, rest: Math.max(0, rest) };
+    for (const [name, list] of Object.entries(this.parts)) {
+      list.push(values[name]);
+      if (list.length > WINDOW) list.shift();
+    }
+    this.peak.push(peak);
+    if (this.peak.length > WINDOW) this.peak.shift();
+    this.bytes = answer.bytes;
+  }
+
+  get count() {
+    return this.peak.length;
+  }
+
+  of(part) {
+    return median(this.parts[part]);
+  }
+
+  /** Time without waiting, us: what the work costs. */
+  get workUs() {
+    return this.of('solve') + this.of('infer') + this.of('rest');
+  }
+}
+
+export class EffectSwitches {
+  /** `listing` as /v1/effects gives it; `changed(name, on)` is called when a switch was moved. */
+  constructor(listing, changed) {
+    this.on = new Set();
+    this.recent = new Recent();
+    this.before = null;
+    this.switched = '';
+    /** The effect switched last. */
+    this.last = '';
+    this.said = '';
+    this.shownAtMs = 0;
+    this.rows = new Map();
+    const session = listing.effects.filter(({ of, name }) => of === 'session' && name in EFFECTS);
+    const order = Object.keys(EFFECTS);
+    session.sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
+    for (const effect of session) this.#row(effect, changed);
+    const bar = byId('frame-bar');
+    this.bars = PARTS.map(([name]) => {
+      const part = document.createElement('i');
+      part.className = name;
+      bar.append(part);
+      return part;
+    });
+    this.keys = PARTS.map(([name, label]) => {
+      const key = document.createElement('span');
+      key.className = `key ${name}`;
+      const figure = document.createElement('output');
+      key.append(`${label} `, figure);
+      byId('frame-key').append(key);
+      return figure;
+    });
+  }
+
+  #row({ name, cost_us: costUs }, changed) {
+    const [label, about] = EFFECTS[name];
+    const row = byId('effects-list').tBodies[0].insertRow();
+    const head = document.createElement('th');
+    head.scope = 'row';
+    const box = Object.assign(document.createElement('input'), { type: 'checkbox', id: `effect-${name}`, autocomplete: 'off' });
+    const check = document.createElement('label');
+    check.className = 'check';
+    const term = document.createElement('span');
+    term.className = 'term';
+    term.dataset.tip = about;
+    term.textContent = label;
+    check.append(box, term);
+    head.append(check);
+    row.append(head);
+    row.insertCell().textContent = costUs === null ? '–' : ms(costUs);
+    const now = row.insertCell();
+    this.rows.set(name, { box, now });
+    box.addEventListener('change', () => {
+      this.set(name, box.checked);
+      changed(name, box.checked);
+    });
+  }
+
+  /** Moves a switch without telling. */
+  set(name, on) {
+    const row = this.rows.get(name);
+    if (!row) return;
+    this.before = this.recent.count >= ENOUGH ? this.recent : null;
+    this.recent = new Recent();
+    this.switched = `${EFFECTS[name][0]} ${on ? 'on' : 'off'}`;
+    this.said = '';
+    this.last = name;
+    row.box.checked = on;
+    if (on) this.on.add(name);
+    else this.on.delete(name);
+    if (on && EXCLUDES[name] && this.on.has(EXCLUDES[name])) this.set(EXCLUDES[name], false);
+    if (!on) row.now.textContent = '';
+  }
+
+  /** Other terms than an effect have changed: what follows is no effect's doing. */
+  forget() {
+    this.before = null;
+    this.recent = new Recent();
+    this.said = '';
+  }
+
+  /** Members of the hello; `pressed` is where, px. */
+  hello(pressed) {
+    const terms = { effects: [...this.on] };
+    if (this.on.has('points')) terms.points = [{ px: pressed.map((x) => Number(x.toFixed(2))) }];
+    if (this.on.has('actuators')) {
+      terms.actuators = { radius_mm: 1, gain: 0.005, actuators: GRID.flatMap((v) => GRID.map((u) => ({ at: { px: [u, v] } }))) };
+    }
+    return terms;
+  }
+
+  /** Takes an answer; `peak` is the largest SED of it. */
+  answer(answer, peak, nowMs) {
+    this.recent.push(answer, peak);
+    if (nowMs - this.shownAtMs < REFRESH_MS) return;
+    this.shownAtMs = nowMs;
+    this.#bar();
+    this.#results(answer);
+    this.#changes();
+  }
+
+  #bar() {
+    const { recent } = this;
+    const whole = PARTS.reduce((sum, [name]) => sum + recent.of(name), 0) || 1;
+    PARTS.forEach(([name], k) => {
+      this.bars[k].style.width = `${(100 * recent.of(name)) / whole}%`;
+      this.keys[k].textContent = `${ms(recent.of(name))} ms`;
+    });
+  }
+
+  /** What each effect brought with this answer. */
+  #results(answer) {
+    const put = (name, text) => {
+      const row = this.rows.get(name);
+      if (row && this.on.has(name) && row.now.textContent !== text) row.now.textContent = text;
+    };
+    if (answer.ratesHz) put('afferents', `fastest ${answer.ratesHz.reduce((a, b) => Math.max(a, b), 0).toFixed(0)} Hz`);
+    if (answer.spikes) put('spikes', `${answer.spikes.count} in this answer, plotted below`);
+    if (answer.summary) put('summary', `${answer.summary[0].toFixed(2)} N on ${answer.summary[1].toFixed(0)} mm²`);
+    if (answer.points) put('points', `${digits(answer.points[0])} J/m³`);
+    if (answer.actuators) put('actuators', Array.from(answer.actuators, (x) => ' ▁▂▃▄▅▆▇█'[Math.round(8 * Math.min(1, x))]).join(''));
+    if (this.on.has('contact_window')) put('contact_window', `${(answer.bytes / 1024).toFixed(0)} KiB an answer`);
+    for (const name of ['relaxation', 'shear_energy']) put(name, `peak of SED ${digits(median(this.recent.peak))} J/m³`);
+  }
+
+  #changes() {
+    const { recent, before } = this;
+    const note = byId('effects-note');
+    if (before && recent.count >= ENOUGH) {
+      const [was, is] = [before.workUs, recent.workUs];
+      const peak = median(recent.peak) / median(before.peak) - 1;
+      const parts = [`${this.switched}: ${is >= was ? '+' : '−'}${ms(Math.abs(is - was))} ms a frame now (${ms(was)} to ${ms(is)})`];
+      if (Math.abs(peak) > 0.005) parts.push(`peak of SED ${peak > 0 ? '+' : '−'}${Math.abs(100 * peak).toFixed(1)} %`);
+      if (recent.bytes !== before.bytes) parts.push(`an answer ${(before.bytes / 1024).toFixed(0)} to ${(recent.bytes / 1024).toFixed(0)} KiB`);
+      this.said = `${parts.join('; ')}.`;
+    }
+    const text = this.said || (this.on.size === 0 ? 'Nothing is named, so no effect is in memory and none takes time.' : '');
+    if (note.textContent !== text) note.textContent = text;
+  }
+}

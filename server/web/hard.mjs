@@ -1,0 +1,241 @@
+// Hard cases: each is sent to this server in a session of its own, and shown with what came back. Beside
+// them what the finite-element code does with its own (docs/reports/stability.md).
+
+import { poseOf } from './contact.mjs';
+import { TABLES, TABLE_LEN, digits } from './colour.mjs';
+import { Press } from './press.mjs';
+import { MAP_LEN, SIDE_PX, Session, sessionUrl } from './protocol.mjs';
+import { fetchJson } from './replay.mjs';
+import { flagsOf } from './words.mjs';
+
+const PATIENCE_MS = 30000;
+const KPA = 1000;
+
+const byId = (id) => document.getElementById(id);
+
+/** Pressure of a round contact in the middle of the pad, Pa. */
+function roundContact(peakPa, radiusPx) {
+  const map = new Float32Array(MAP_LEN);
+  for (let row = 0; row < SIDE_PX; row++) {
+    for (let column = 0; column < SIDE_PX; column++) {
+      const d2 = ((row - 105) ** 2 + (column - 112) ** 2) / radiusPx ** 2;
+      if (d2 < 1) map[row * SIDE_PX + column] = peakPa * Math.sqrt(1 - d2);
+    }
+  }
+  return map;
+}
+
+/** The indenter of a case, and its pose so deep. */
+function pressed(atlas, shape, size, depthMm, [u, v] = [112, 105]) {
+  const press = new Press(atlas);
+  press.setShape(shape, size, 0, [0, 0]);
+  press.moveToPixel(u, v);
+  press.evaluate(depthMm);
+  const pose = new Float32Array(7);
+  poseOf(press, depthMm, pose);
+  return { objects: [{ shape: press.body.hello }], pose };
+}
+
+const objects = (list) => ({ input: 'objects', pressure: 'map', objects: list });
+
+/**
+ * The cases. `make(atlas, mostPa)` gives the terms and the frames: maps of pressure or poses, the last of
+ * which is the case. `needsContact`: only a server with a contact model takes it.
+ */
+export const CASES = [
+  { name: 'Checkerboard', sent: '20 kPa on every other pixel: no skin presses like that', make: () => ({
+    terms: {}, frames: [Float32Array.from({ length: MAP_LEN }, (_, i) => ((Math.floor(i / SIDE_PX) + (i % SIDE_PX)) % 2 ? 20 * KPA : 0))],
+  }) },
+  { name: 'Not a number', sent: 'a contact of 10 kPa with one pixel that is NaN', make: () => {
+    const map = roundContact(10 * KPA, 24);
+    map[105 * SIDE_PX + 112] = NaN;
+    return { terms: {}, frames: [map] };
+  } },
+  { name: 'Ten times the range', sent: 'ten times the greatest pressure of the training', make: (_, mostPa) => ({ terms: {}, frames: [roundContact(10 * mostPa, 24)] }) },
+  { name: 'Blade', sent: 'a blade of 0.05 mm, 2 mm deep', needsContact: true, make: (atlas) => {
+    const { objects: list, pose } = pressed(atlas, 'wedge', 1, 2);
+    return { terms: objects(list), frames: [pose] };
+  } },
+  { name: 'Jump of 10 mm', sent: 'a ball 8.5 mm off the skin, and in the next frame 1.5 mm deep', needsContact: true, make: (atlas) => {
+    const { objects: list, pose } = pressed(atlas, 'sphere', 5, 1.5);
+    const off = pressed(atlas, 'sphere', 5, -8.5).pose;
+    return { terms: objects(list), frames: [off, pose] };
+  } },
+  { name: 'Off the edge', sent: 'a plate 1.5 mm deep where the map of the finger ends', needsContact: true, make: (atlas) => {
+    const { objects: list, pose } = pressed(atlas, 'plate', 0, 1.5, [112, 200]);
+    return { terms: objects(list), frames: [pose] };
+  } },
+  { name: 'No rotation', sent: 'a pose whose quaternion has length 2', needsContact: true, make: (atlas) => {
+    const { objects: list, pose } = pressed(atlas, 'sphere', 5, 1);
+    for (let k = 3; k < 7; k++) pose[k] *= 2;
+    return { terms: objects(list), frames: [pose] };
+  } },
+  { name: 'Metres for mm', sent: 'a ball of 0.01 mm: its radius of 10 mm, given in m', needsContact: true, make: (atlas) => {
+    const { pose } = pressed(atlas, 'sphere', 5, 1);
+    return { terms: objects([{ shape: { shape: 'sphere', radius_mm: 0.01 } }]), frames: [pose] };
+  } },
+];
+
+/** Sends a case; resolves with what came of it: `ready`, `answer` (its maps copied), or `problem`. */
+export function sendCase(hardCase, atlas, mostPa, tier) {
+  const { terms, frames } = hardCase.make(atlas, mostPa);
+  return new Promise((resolve) => {
+    let next = 0;
+    let patience = 0;
+    const end = (outcome) => {
+      clearTimeout(patience);
+      session.close();
+      resolve({ frame: frames.at(-1), isMap: frames[0].length === MAP_LEN, warnings: session.warnings ?? [], ...outcome });
+    };
+    const send = () => {
+      const frame = frames[next].length === MAP_LEN ? session.mapFrame : session.poseFrame;
+      frame.values.set(frames[next++]);
+      session.send(performance.now(), frame);
+    };
+    const session = new Session(sessionUrl(), {
+      onstate: () => {},
+      onready: (ready) => {
+        session.warnings = ready.warnings ?? [];
+        // On a new connection the case begins anew.
+        next = 0;
+        send();
+      },
+      onanswer: (answer) => {
+        if (next < frames.length) {
+          send();
+          return;
+        }
+        const { sedJPerM3, pressurePa } = answer;
+        end({ answer: { ...answer, sedJPerM3: sedJPerM3?.slice() ?? null, pressurePa: pressurePa?.slice() ?? null, touch: answer.touch?.slice() ?? null } });
+      },
+      onfault: (code, message, problem) => end({ problem: problem ?? { code, message } }),
+    }, PATIENCE_MS);
+    patience = setTimeout(() => end({ problem: { code: 'lost', message: `no answer within ${PATIENCE_MS / 1000} s` } }), PATIENCE_MS);
+    session.open({ tier, ...terms });
+  });
+}
+
+/** One word for what came of a case, and a sentence. */
+export function verdictOf({ answer, problem, warnings }, mostPa) {
+  if (problem) return { kind: 'refused', text: `Refused: ${problem.code}`, more: problem.message };
+  const flags = flagsOf(answer, mostPa);
+  const asked = warnings.map(({ question }) => question);
+  if (answer.status !== 'ok') return { kind: 'refused', text: answer.status, more: '' };
+  if (flags.length) return { kind: 'flagged', text: `Answered with a flag: ${flags.join('; ')}`, more: asked.join(' ') };
+  if (asked.length) return { kind: 'flagged', text: 'Answered with a question', more: asked.join(' ') };
+  if (answer.noContact) return { kind: 'plain', text: 'Nothing touches; all is zero', more: '' };
+  return { kind: 'plain', text: 'Answered without a flag: nothing is known to be wrong', more: '' };
+}
+
+function picture(values, table, label) {
+  const figure = document.createElement('figure');
+  const canvas = Object.assign(document.createElement('canvas'), { width: SIDE_PX, height: SIDE_PX });
+  canvas.setAttribute('role', 'img');
+  canvas.setAttribute('aria-label', label);
+  const context = canvas.getContext('2d');
+  const image = context.createImageData(SIDE_PX, SIDE_PX);
+  const words = new Uint32Array(image.data.buffer);
+  const colours = new Uint32Array(TABLES[table].buffer);
+  const most = values.reduce((a, b) => (b > a ? b : a), 0) || 1;
+  for (let i = 0; i < MAP_LEN; i++) words[i] = Number.isNaN(values[i]) ? 0xff0000ff : values[i] > 0 ? colours[Math.min(TABLE_LEN - 1, Math.floor((values[i] / most) * TABLE_LEN))] : 0;
+  context.putImageData(image, 0, 0);
+  const caption = document.createElement('figcaption');
+  caption.textContent = label;
+  figure.append(canvas, caption);
+  return figure;
+}
+
+export class HardCases {
+  /** `mostPa()`, `tier()`: of the session that runs. */
+  constructor(atlas, hasContact, mostPa, tier) {
+    this.atlas = atlas;
+    this.mostPa = mostPa;
+    this.tier = tier;
+    this.running = null;
+    const list = CASES.filter(({ needsContact }) => hasContact || !needsContact);
+    this.buttons = list.map((hardCase) => {
+      const button = Object.assign(document.createElement('button'), { type: 'button', textContent: hardCase.name });
+      button.setAttribute('aria-pressed', 'false');
+      button.addEventListener('click', () => this.run(hardCase, button));
+      return button;
+    });
+    byId('hard-cases').append(...this.buttons);
+    for (const input of document.querySelectorAll('input[name=hard]')) input.addEventListener('change', () => this.#tab(input.value));
+  }
+
+  /** Shows the first case without being asked, so that there is something to see. */
+  begin() {
+    if (this.running === null) this.run(CASES[0], this.buttons[0]);
+  }
+
+  async run(hardCase, button) {
+    for (const other of this.buttons) other.setAttribute('aria-pressed', String(other === button));
+    const box = byId('hard-case');
+    const mine = {};
+    this.running = mine;
+    box.dataset.state = 'sent';
+    const outcome = await sendCase(hardCase, this.atlas, this.mostPa(), this.tier());
+    if (this.running === mine) this.#show(box, hardCase, outcome);
+  }
+
+  #show(box, hardCase, outcome) {
+    const { answer, frame, isMap } = outcome;
+    const verdict = verdictOf(outcome, this.mostPa());
+    const pictures = document.createElement('div');
+    pictures.className = 'pictures';
+    const pressure = isMap ? frame : answer?.pressurePa;
+    if (pressure) pictures.append(picture(pressure, 'viridis', isMap ? 'pressure sent' : 'pressure found'));
+    if (answer?.sedJPerM3) pictures.append(picture(answer.sedJPerM3, 'inferno', 'SED answered'));
+    const list = document.createElement('dl');
+    const line = (name, text, kind = '') => {
+      if (!text) return;
+      const [dt, dd] = [document.createElement('dt'), document.createElement('dd')];
+      dt.textContent = name;
+      dd.textContent = text;
+      dd.className = kind;
+      list.append(dt, dd);
+    };
+    line('sent', hardCase.sent);
+    line('came back', verdict.text, `verdict ${verdict.kind}`);
+    line('', verdict.more);
+    if (answer?.status === 'ok') {
+      const peak = answer.sedJPerM3.reduce((a, b) => Math.max(a, b), 0);
+      const finite = answer.sedJPerM3.every((x) => Number.isFinite(x) && x >= 0);
+      line('SED', `up to ${digits(peak)} J/m³; ${finite ? 'every pixel finite and not below 0' : 'NOT finite everywhere'}`);
+      if (answer.touch) line('force', `${Math.hypot(answer.touch[0], answer.touch[1], answer.touch[2]).toFixed(2)} N`);
+      line('in', `${(answer.serverUs / 1000).toFixed(1)} ms`);
+    }
+    box.replaceChildren(pictures, list);
+    box.dataset.state = verdict.kind;
+  }
+
+  async #tab(name) {
+    byId('hard-live').hidden = name !== 'live';
+    byId('hard-fe').hidden = name !== 'fe';
+    if (name !== 'fe' || byId('hard-fe').childElementCount > 0) return;
+    const { summary, cases } = await fetchJson('stability.json');
+    const about = document.createElement('p');
+    about.className = 'hint';
+    about.textContent = `${summary} A case converges to an answer that is checked, or a typed error says what is wrong.`;
+    byId('hard-fe').append(about, ...cases.map(feCase));
+  }
+}
+
+function feCase({ name, about, variants }) {
+  const box = document.createElement('details');
+  const head = document.createElement('summary');
+  const code = document.createElement('b');
+  code.textContent = name;
+  const count = (word) => variants.filter(([, end]) => end === word).length;
+  const counts = ['converged', 'evaluated', 'refused'].map((word) => [count(word), word]).filter(([n]) => n > 0);
+  head.append(code, ` ${counts.map(([n, word]) => `${n} ${word}`).join(', ')}`);
+  const text = document.createElement('p');
+  text.textContent = about;
+  const table = document.createElement('table');
+  for (const [variant, end, more] of variants) {
+    const row = table.insertRow();
+    for (const words of [variant, end, more]) row.insertCell().textContent = words;
+  }
+  box.append(head, text, table);
+  return box;
+}

@@ -1,0 +1,68 @@
+// Plain names for what files and protocol call otherwise, each with a sentence that explains it.
+
+/** Sets of simulations that models are judged on (models/ladder.json). */
+const SETS = {
+  reference: ['finest mesh', 'the only set that finite elements on coarser meshes were held against'],
+  'reference-anew': ['finest mesh, new poses', 'solved when everything was decided'],
+  'heldout-presses': ['new presses, known shapes', 'the table of the README is of these, and the service chooses by them'],
+  'heldout-shapes': ['shapes never trained on', ''],
+  pressed: ['hard presses', 'a plate to 7 N, a key, gratings, Braille'],
+  s1: ['a flat plate', 'as in the paper of the published U-Net'],
+  cards: ['the models’ own cards', ''],
+};
+
+/** Name of a set for people; an unknown one keeps its own. */
+export const nameOfSet = (set) => SETS[set]?.[0] ?? set;
+
+/** A sentence about a set of the ladder. */
+export function aboutSet(sets, name) {
+  const set = sets?.find((one) => one.name === name);
+  const more = SETS[name]?.[1];
+  const count = set ? `${set.samples} simulations: ${set.about}` : '';
+  return [count, more].filter(Boolean).join('; ');
+}
+
+const TIERS = {
+  's1-base16': ['published U-Net', 'The network of the paper, trained on a flat plate alone; for comparison.'],
+  's1-base16-relative': ['published U-Net, scaled', 'The network of the paper on relative pressure; for comparison.'],
+  'half-space': ['half-space', 'A closed form for a flat elastic block: no network, and rough on a finger.'],
+  'large-maps': ['large-maps', 'Trained only on pressure from finite elements: best where that is known.'],
+};
+
+export const nameOfTier = (tier) => TIERS[tier]?.[0] ?? tier;
+export const aboutTier = (tier) => TIERS[tier]?.[1] ?? '';
+
+/** Contact methods (docs/concepts/contact.md). */
+const METHODS = {
+  pixels: ['pixels', 'Pressure is solved at every pixel: the most accurate.'],
+  coarse_pixels: ['half the pixels', 'Pressure is solved at every second pixel.'],
+  second_order: ['vertices', 'Pressure is solved at the vertices of the mesh, with large motions.'],
+  small_strain: ['vertices, small strain', 'As with vertices, for small motions alone.'],
+  springs: ['springs', 'The skin as springs side by side: fastest, and rough.'],
+};
+
+export const nameOfMethod = (method) => METHODS[method]?.[0] ?? method;
+export const aboutMethod = (method) => METHODS[method]?.[1] ?? '';
+
+/** Flags of an answer, as the page says them; `mostPa` is the greatest pressure of the training. */
+export function flagsOf({ outOfRange, unfamiliar, unsettled, cutOff, coarseClock }, mostPa) {
+  const words = [];
+  if (outOfRange) words.push(mostPa ? `harder than any press it learnt: it saw ${(mostPa / 1000).toFixed(0)} kPa at most` : 'beyond what it learnt');
+  if (unfamiliar) words.push('unlike any press it learnt: this may mean nothing');
+  if (unsettled) words.push('the contact did not settle: rough');
+  if (cutOff) words.push('cut off at the edge of the map');
+  if (coarseClock) words.push('the clock is coarse: rates may be off');
+  return words;
+}
+
+/** Effects of a session: name and what it does, for people. */
+export const EFFECTS = {
+  shear_energy: ['Shear from friction', 'Adds to SED what friction along the skin changes. It needs an object with friction.'],
+  relaxation: ['Creep', 'The tissue yields slowly under constant pressure.'],
+  afferents: ['Firing rates', 'How fast slowly adapting (SA1) fibres fire, at every pixel.'],
+  spikes: ['Spikes', 'When each touch fibre of the finger fires.'],
+  summary: ['Summary', 'Force, area, peak and moments in sixteen numbers.'],
+  points: ['SED at points', 'Values at listed places, here at the point that is pressed.'],
+  actuators: ['Actuators', 'One intensity for each actuator of a display, here 4 x 4 electrodes.'],
+  contact_window: ['Only the contact', 'Cuts the map of the answer to the contact and a margin.'],
+};
