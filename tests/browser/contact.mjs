@@ -234,11 +234,11 @@ test('a press is recorded and sent again, and goes into files', async () => {
   const rows = (await saved('save-csv')).toString().trim().split('\n');
   assert.equal(rows.length, depths.length + 1);
   assert.match(rows[0], /^ms,u_px,v_px,depth_mm,/);
-  await page.fill('#depth', '2');
+  await page.fill('#depth', '1.5');
   await settled();
   await page.click('#play-record');
   await until(() => globalThis.papilla.control.depthMm < 1.3);
-  await until(() => !globalThis.papilla.timeline.isPlaying && globalThis.papilla.control.depthMm === 2);
+  await until(() => !globalThis.papilla.timeline.isPlaying && globalThis.papilla.control.depthMm === 1.5);
   assert.equal((await saved('save-npy')).subarray(1, 6).toString(), 'NUMPY');
   assert.equal((await saved('save-png')).subarray(1, 4).toString(), 'PNG');
 });

@@ -77,7 +77,7 @@ pub(crate) async fn openapi(State(app): Shared, headers: HeaderMap) -> Answer {
 
 async fn serve(
     app: &App,
-    files: &'static [(&str, &[u8])],
+    files: &'static [(&'static str, &'static [u8])],
     part: fn(usize) -> Part,
     name: &str,
     headers: &HeaderMap,
