@@ -249,7 +249,7 @@ test('a link holds what is pressed and how it is computed', async () => {
   await page.fill('#depth', '0.8');
   await page.fill('#tilt', '12');
   const hash = await page.evaluate(() => { const { state } = globalThis.papilla; return new URLSearchParams(state).toString(); });
-  const other = await page.context().newPage();
+  const other = await browser.newPage();
   await other.goto(`${BASE}#${hash}`, { timeout: PATIENCE_MS });
   await other.waitForFunction(() => globalThis.papilla?.session.ready, undefined, { timeout: PATIENCE_MS });
   const [here, there] = await Promise.all([page, other].map((one) => one.evaluate(() => globalThis.papilla.state)));
