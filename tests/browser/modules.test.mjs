@@ -426,5 +426,10 @@ test('what came of a hard case is told as it is', () => {
 
 test('the hard cases of the finite elements are those of the report', async () => {
   const { fileOf } = await import('./stability.mjs');
-  assert.equal(await readFile(new URL('../../server/web/stability.json', import.meta.url), 'utf8'), await fileOf(), 'write it anew: node tests/browser/stability.mjs');
+  const file = await readFile(new URL('../../server/web/stability.json', import.meta.url), 'utf8');
+  assert.equal(file, await fileOf(), 'write it anew: node tests/browser/stability.mjs');
+  const { summary, cases } = JSON.parse(file);
+  const ends = cases.flatMap(({ variants }) => variants.map(([, end]) => end));
+  const count = (...words) => ends.filter((end) => words.includes(end)).length;
+  assert.equal(summary, `${ends.length} variants of ${cases.length} cases: ${count('converged', 'evaluated')} converged or evaluated, ${count('refused')} refused, 0 break their promise.`);
 });
