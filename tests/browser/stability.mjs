@@ -17,14 +17,15 @@ function rowsOf(csv) {
 
 /** Cases: name, what is promised, and each variant with how it ended and why. */
 export function casesOf(report, csv) {
-  const cases = Array.from(report.matchAll(/^\| `(.+?)` \| (.+?) \|/gm), ([, name, about]) => ({ name, about, variants: [] }));
-  for (const row of rowsOf(csv)) {
-    const one = cases.find(({ name }) => name === row.case);
-    if (!one) throw new Error(`${row.case} of the table is no case of the report`);
-    one.variants.push([row.variant, row.end, row.error || row['nearest to its tolerance']]);
+  const promises = new Map(Array.from(report.matchAll(/^\| `(.+?)` \| (.+?) \|/gm), ([, name, about]) => [name, about]));
+  const cases = new Map();
+  for (const { case: name, variant, end, error, 'nearest to its tolerance': nearest } of rowsOf(csv)) {
+    if (!promises.has(name)) throw new Error(`${name} of the table is no case of the report`);
+    if (!cases.has(name)) cases.set(name, { name, about: promises.get(name), variants: [] });
+    cases.get(name).variants.push([variant, end, error || nearest]);
   }
   const [summary] = report.match(/^\d+ variants of \d+ cases: [^;]*/m);
-  return { summary: `${summary}.`, cases };
+  return { summary: `${summary}.`, cases: [...cases.values()] };
 }
 
 export const fileOf = async () => `${JSON.stringify(casesOf(...await Promise.all([REPORT, TABLE].map((file) => readFile(file, 'utf8')))))}\n`;
