@@ -107,7 +107,7 @@ pub fn check(config: &Config) -> Report {
         }
     }
     let loaded = Assets::of(config).and_then(|assets| {
-        let catalogue = Catalogue::load(&assets, Loading::of(config), None)?;
+        let catalogue = Catalogue::load(&assets, Loading::of_all(config), None)?;
         Ok((assets, catalogue))
     });
     let mut solves_contact = false;
@@ -153,11 +153,12 @@ fn look_at_threads(report: &mut Report, config: &Config, catalogue: &Catalogue) 
     let before = resident_bytes();
     let mut maps = Maps::default();
     let warm = |tier: &Tier, maps: &mut Maps| {
-        tier.warm_session(&mut maps.pressure_pa, &mut maps.sed_j_per_m3)
+        let model = tier.model()?;
+        tier.warm_session(model.as_ref(), &mut maps.pressure_pa, &mut maps.sed_j_per_m3).ok()
     };
     // Err: the model is named below, by its golden answers.
     let sessions: Vec<_> =
-        catalogue.tiers.iter().filter_map(|tier| warm(tier, &mut maps).ok()).collect();
+        catalogue.tiers.iter().filter_map(|tier| warm(tier, &mut maps)).collect();
     let grown = resident_bytes().zip(before).map(|(now, before)| now.saturating_sub(before));
     drop(sessions);
     let (detail, values) = match grown {
@@ -196,7 +197,9 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     }
     for (index, tier) in catalogue.offered() {
         let what = format!("model {}", tier.name);
-        let golden = match golden::check(catalogue.golden_states(), tier) {
+        let Some(model) = tier.model() else { continue };
+        let states = catalogue.golden_states();
+        let golden = match golden::check(states, model.as_ref(), tier.relative_l2_p95) {
             Ok(golden) => golden,
             Err(error) => {
                 report.bad(&what, 3, &error);
@@ -217,14 +220,14 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
         let values = json!({
             "tier": tier.name,
             "default": is_default,
-            "onnx_sha256": tier.model.info().onnx_sha256,
+            "onnx_sha256": tier.onnx_sha256,
             "atlas_hash": tier.atlas_hash,
-            "backend": tier.model.info().backend,
+            "backend": model.info().backend,
             "golden": golden,
             "calibrated_us": tier.latency.calibrated_us(),
             "predicted_latency_us": predicted_us,
         });
-        let backend = &tier.model.info().backend;
+        let backend = &model.info().backend;
         report.good(&what, format!("{predicted_us} us in {backend}, {answers}{default}"), values);
     }
 }

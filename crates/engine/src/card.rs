@@ -205,21 +205,35 @@ pub struct Index {
     pub default: String,
     /// Names of all models; each has `NAME.onnx` and `NAME.json` beside the index.
     pub models: Vec<String>,
+    /// Those of `models` that a service loads when a client first names them; no budget picks them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub on_demand: Vec<String>,
 }
 
 impl Index {
     /// Reads the index.
     ///
     /// # Errors
-    /// [`EngineError::BadIndex`] if it is not JSON of this shape, lists nothing, or names a
-    /// default that is not in the list.
+    /// [`EngineError::BadIndex`] if it is not JSON of this shape, lists nothing, names a default or
+    /// a model to load on demand that is not in the list, or the default as one of the latter.
     pub fn from_json(text: &str) -> Result<Self, EngineError> {
         let index: Self = json::read(text.as_bytes())
             .map_err(|error| EngineError::BadIndex { reason: error.to_string() })?;
-        if index.models.contains(&index.default) {
-            return Ok(index);
+        match index.fault() {
+            None => Ok(index),
+            Some(reason) => Err(EngineError::BadIndex { reason }),
         }
-        let reason = format!("the default '{}' is not in 'models'", index.default);
-        Err(EngineError::BadIndex { reason })
+    }
+
+    fn fault(&self) -> Option<String> {
+        let Self { default, models, on_demand } = self;
+        if !models.contains(default) {
+            return Some(format!("the default '{default}' is not in 'models'"));
+        }
+        if let Some(stranger) = on_demand.iter().find(|name| !models.contains(name)) {
+            return Some(format!("'{stranger}' of 'on_demand' is not in 'models'"));
+        }
+        let is_late = on_demand.contains(default);
+        is_late.then(|| format!("the default '{default}' is in 'on_demand'; take it out of there"))
     }
 }

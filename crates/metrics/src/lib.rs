@@ -42,6 +42,8 @@ pub const BUCKETS_S: [f64; 18] = [
 
 /// What became of a reload.
 const RELOADS: [&str; 3] = ["ok", "refused", "busy"];
+/// What became of a model that was loaded when its tier was first named.
+const FIRST_USES: [&str; 2] = ["ok", "refused"];
 
 type Stages = Family<StageLabels, Histogram, fn() -> Histogram>;
 type Requests = Family<RequestLabels, Histogram, fn() -> Histogram>;
@@ -106,6 +108,7 @@ pub struct Metrics {
     models: Family<ModelLabels, Gauge>,
     shed: Family<ShedLabels, Counter>,
     reloads: Family<ReloadLabels, Counter>,
+    first_uses: Family<ReloadLabels, Counter>,
     real_time: Family<GrantLabels, Gauge>,
     http: TransportMetrics,
     session: TransportMetrics,
@@ -157,6 +160,11 @@ impl Metrics {
             models: registered(registry, "model", "Models on offer; the value is always 1"),
             shed: registered(registry, "shed", "Work turned away, by reason"),
             reloads: registered(registry, "reloads", "Reloads of the models, by outcome"),
+            first_uses: registered(
+                registry,
+                "first_uses",
+                "Models loaded when their tier was first named, by outcome",
+            ),
             real_time: registered(
                 registry,
                 "real_time",
@@ -196,6 +204,9 @@ impl Metrics {
         // Counted from nothing, so that the first one is a rise and not a new line.
         for outcome in RELOADS {
             let _ = metrics.reloads.get_or_create(&ReloadLabels { outcome: Word(outcome) });
+        }
+        for outcome in FIRST_USES {
+            let _ = metrics.first_uses.get_or_create(&ReloadLabels { outcome: Word(outcome) });
         }
         for code in ErrorCode::ALL {
             let _ = metrics.errors.get_or_create(&CodeLabels { code: Word(code.as_str()) });
@@ -258,6 +269,12 @@ impl Metrics {
     /// Counts a reload that was done, or changed nothing.
     pub fn reload(&self, is_ok: bool) {
         self.count_reload(RELOADS[usize::from(!is_ok)]);
+    }
+
+    /// Counts a model that was loaded when its tier was first named, or was unusable.
+    pub fn first_use(&self, is_ok: bool) {
+        let outcome = Word(FIRST_USES[usize::from(!is_ok)]);
+        self.first_uses.get_or_create(&ReloadLabels { outcome }).inc();
     }
 
     /// Counts a reload that came while another was under way.

@@ -15,6 +15,10 @@ pub(crate) struct Options {
     /// The model to take unasked.
     #[arg(long, value_name = "NAME")]
     default: String,
+    /// A model that the service loads when a client first names it, and that no budget picks; may
+    /// be given several times.
+    #[arg(long, value_name = "NAME")]
+    on_demand: Vec<String>,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
@@ -30,9 +34,16 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     // From small to large: the order in which they are offered.
     models.sort_by_key(|(bytes, name)| (*bytes, name.clone()));
     let models: Vec<String> = models.into_iter().map(|(_, name)| name).collect();
-    if !models.contains(&options.default) {
-        bail!("there is no model '{}' in {}", options.default, options.folder.display());
+    let named = std::iter::once(&options.default).chain(&options.on_demand);
+    if let Some(stranger) = named.into_iter().find(|name| !models.contains(name)) {
+        bail!("there is no model '{stranger}' in {}", options.folder.display());
     }
+    if options.on_demand.contains(&options.default) {
+        bail!("the default '{}' has to be loaded at the start", options.default);
+    }
+    // In the order of the models.
+    let on_demand =
+        models.iter().filter(|name| options.on_demand.contains(name)).cloned().collect();
     for name in &models {
         let card = load_card(&options.folder.join(format!("{name}.json")))?;
         let path = options.folder.join(format!("{name}.onnx"));
@@ -42,7 +53,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         }
         require_atlas("atlas.json", atlas.hash(), model.info())?;
     }
-    let index = Index { default: options.default.clone(), models };
+    let index = Index { default: options.default.clone(), models, on_demand };
     let text = serde_json::to_string_pretty(&index)? + "\n";
     let path = options.folder.join("index.json");
     write(&path, text.as_bytes())?;

@@ -6,6 +6,7 @@
 mod answer;
 pub(crate) mod app;
 mod bucket;
+mod first_use;
 pub(crate) mod front;
 pub(crate) mod gate;
 mod http;

@@ -2,7 +2,10 @@
 //!
 //! `papilla-oip` reads requests and writes answers. Every tier is a model of version 1.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use axum::{
     body::Body,
@@ -28,6 +31,7 @@ use crate::{
             render::{Rendered, count, through_pool},
         },
         app::App,
+        first_use,
         gate::Principal,
     },
 };
@@ -114,7 +118,7 @@ pub(crate) async fn infer(
 }
 
 async fn answer(
-    app: &App,
+    app: &Arc<App>,
     principal: &Principal,
     uri: &Uri,
     headers: &HeaderMap,
@@ -125,6 +129,7 @@ async fn answer(
     body::require_plain(headers)?;
     let received = Instant::now();
     let tier = named(app, uri)?;
+    first_use::wait(app, tier, principal.client.as_ref(), app.timeouts.io).await?;
     // Held until the answer is written: it bounds the work below as well.
     let _place = app.admit_request()?;
     let head_len = head_len(headers.get(HEAD_LEN).map(HeaderValue::as_bytes), body.len())?;

@@ -9,6 +9,7 @@ mod clocks;
 mod contact;
 mod drain;
 mod effects;
+mod first_use;
 mod gate;
 mod hard;
 mod hostile;

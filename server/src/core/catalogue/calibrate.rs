@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use bytes::BytesMut;
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
+use papilla_engine::Model;
 use papilla_proto::{MAP_LEN, SampleType, check_pressure};
 use papilla_session_effects as effects;
 
@@ -45,15 +46,15 @@ pub(crate) fn calibrate_noting(
         return Ok(());
     }
     let begun = Instant::now();
-    let is_new = |tier: &&Tier| tier.latency.calibrated_us().is_none();
+    let is_new = |tier: &&Tier| tier.is_loaded() && tier.latency.calibrated_us().is_none();
     let mut new: Vec<&Tier> = catalogue.tiers.iter().filter(is_new).collect();
     new.sort_by_key(|tier| tier.latency.typical_us());
     let share = time / u32::try_from(new.len()).unwrap_or(u32::MAX).max(1);
     let mut found = Vec::with_capacity(new.len());
     for tier in new {
-        let mut times = runs(tier, share)?;
-        tier.latency.calibrate(&mut times);
-        let (us, backend) = (tier.latency.typical_us(), &tier.model.info().backend);
+        let Some(model) = tier.model() else { continue };
+        measure(tier, model.as_ref(), share)?;
+        let (us, backend) = (tier.latency.typical_us(), &model.info().backend);
         found.push(format!("{} {us} us in {backend}", tier.name));
         note(&tier.name);
     }
@@ -73,22 +74,31 @@ pub(crate) fn calibrate_noting(
     Ok(())
 }
 
-/// Measures a tier again that no frame has measured since the last look.
+/// Measures a tier with its model, in about `share`.
+///
+/// # Errors
+/// It does not run.
+pub(crate) fn measure(tier: &Tier, model: &dyn Model, share: Duration) -> Result<(), StartError> {
+    tier.latency.calibrate(&mut runs(tier, model, share)?);
+    Ok(())
+}
+
+/// Measures a tier again that no frame has measured since the last look, if it is loaded.
 ///
 /// # Errors
 /// It does not run.
 pub(crate) fn remeasure(tier: &Tier) -> Result<(), StartError> {
-    if tier.latency.is_idle() {
-        tier.latency.correct(&mut runs(tier, Duration::ZERO)?);
+    if let Some(model) = tier.model().filter(|_| tier.latency.is_idle()) {
+        tier.latency.correct(&mut runs(tier, model.as_ref(), Duration::ZERO)?);
     }
     Ok(())
 }
 
-fn runs(tier: &Tier, share: Duration) -> Result<Vec<Duration>, StartError> {
+fn runs(tier: &Tier, model: &dyn Model, share: Duration) -> Result<Vec<Duration>, StartError> {
     let failed = |source| StartError::Engine { tier: tier.name.clone(), source };
     let [mut pressure_pa, mut sed_j_per_m3] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
     let begun = Instant::now();
-    let mut session = tier.warm_session(&mut pressure_pa, &mut sed_j_per_m3)?;
+    let mut session = tier.warm_session(model, &mut pressure_pa, &mut sed_j_per_m3)?;
     let mut times = Vec::new();
     while times.len() < RUNS_MIN || (times.len() < RUNS_MAX && begun.elapsed() < share) {
         let start = Instant::now();

@@ -13,7 +13,7 @@ use papilla_engine::{
 use papilla_proto::{MAP_LEN, atlas::Raster};
 use serde::Serialize;
 
-use super::{Tier, replay::Replay};
+use super::replay::Replay;
 
 /// A state may err by so many times the 95th percentile of the card's test states: rare ones do,
 /// while a wrong scale or orientation errs by about 1.
@@ -75,12 +75,17 @@ pub(crate) struct States<'a> {
     pub(crate) interface: &'a Raster,
 }
 
-/// Asks `tier` for every state of the replay; None if there are none.
+/// Asks a model for every state of the replay; None if there are none. The card allows it the error
+/// `relative_l2_p95` in one state of twenty.
 ///
 /// # Errors
 /// It does not run, or an answer is further off than its card allows.
-pub(crate) fn check(of: States<'_>, tier: &Tier) -> Result<Option<Golden>, GoldenError> {
-    let mut session = tier.model.session()?;
+pub(crate) fn check(
+    of: States<'_>,
+    model: &dyn Model,
+    relative_l2_p95: f64,
+) -> Result<Option<Golden>, GoldenError> {
+    let mut session = model.session()?;
     let [mut pressure_pa, mut due, mut found] = [0, 1, 2].map(|_| vec![0.0; MAP_LEN]);
     let states = &of.replay.states;
     let mut worst: Option<Golden> = None;
@@ -105,7 +110,7 @@ pub(crate) fn check(of: States<'_>, tier: &Tier) -> Result<Option<Golden>, Golde
                 states: states.len(),
                 state: state.name.clone(),
                 relative_l2,
-                relative_l2_max: (TIMES_P95 * tier.relative_l2_p95).max(ERROR_MIN),
+                relative_l2_max: (TIMES_P95 * relative_l2_p95).max(ERROR_MIN),
                 share,
             });
         }
@@ -120,23 +125,24 @@ pub(crate) fn check(of: States<'_>, tier: &Tier) -> Result<Option<Golden>, Golde
     }
 }
 
-/// Gives back to tract every model that another backend answers wrongly; `in_tract` loads it there.
+/// Gives a model back to tract that another backend answers wrongly; `in_tract` loads it there.
 /// That backend was the faster one and did well on one map.
 ///
 /// # Errors
-/// A model does not load in tract.
+/// The model does not load in tract.
 pub(crate) fn fall_back(
     states: States<'_>,
-    tiers: &mut [Tier],
-    in_tract: impl Fn(&Tier) -> Result<Arc<dyn Model>, EngineError>,
-) -> Result<(), (String, EngineError)> {
-    for tier in tiers.iter_mut().filter(|tier| tier.model.backend() != Backend::Tract) {
-        let Err(error) = check(states, tier) else { continue };
-        let backend = &tier.model.info().backend;
-        tracing::warn!(tier = tier.name, backend, %error, "tract runs this model");
-        tier.model = in_tract(tier).map_err(|error| (tier.name.clone(), error))?;
+    model: Arc<dyn Model>,
+    relative_l2_p95: f64,
+    in_tract: impl FnOnce() -> Result<Arc<dyn Model>, EngineError>,
+) -> Result<Arc<dyn Model>, EngineError> {
+    if model.backend() == Backend::Tract {
+        return Ok(model);
     }
-    Ok(())
+    let Err(error) = check(states, model.as_ref(), relative_l2_p95) else { return Ok(model) };
+    let (tier, backend) = (&model.info().name, &model.info().backend);
+    tracing::warn!(tier, backend, %error, "tract runs this model");
+    in_tract()
 }
 
 #[cfg(test)]
@@ -154,22 +160,23 @@ mod tests {
             model("wrong", Backend::Ort, 0.001),
             model("tract's own", Backend::Tract, 0.001),
         ];
-        let tiers = models.map(|model| testing::tier(model, 0.1)).to_vec();
-        let mut catalogue = testing::catalogue(tiers);
+        let catalogue = testing::catalogue(vec![testing::tier(models[0].clone(), 0.1)]);
         let values = vec![3.0; catalogue.skin.pixel_count()];
         let state =
             json!({"name": "flat", "depth_mm": 1, "pressure_pa": values, "sed_j_per_m3": values});
         let replay = serde_json::from_value(json!({"presses": [state]})).unwrap();
         let (skin, interface) = (&catalogue.skin, &catalogue.interface);
-        let (states, tiers) = (States { replay: &replay, skin, interface }, &mut catalogue.tiers);
-        let failed = |_: &Tier| Err(EngineError::BadCard { reason: "none".to_owned() });
-        assert_eq!(fall_back(states, tiers, failed).unwrap_err().0, "wrong");
-        let in_tract = |tier: &Tier| Ok(model(&tier.name, Backend::Tract, 1.0));
-        fall_back(states, tiers, in_tract).unwrap();
-        let backends: Vec<Backend> = tiers.iter().map(|tier| tier.model.backend()).collect();
+        let states = States { replay: &replay, skin, interface };
+        let failed = || Err(EngineError::BadCard { reason: "none".to_owned() });
+        assert!(fall_back(states, models[1].clone(), 0.0, failed).is_err());
+        let fallen = models.map(|found| {
+            let in_tract = || Ok(model(&found.info().name, Backend::Tract, 1.0));
+            fall_back(states, Arc::clone(&found), 0.0, in_tract).unwrap()
+        });
+        let backends = fallen.each_ref().map(|model| model.backend());
         assert_eq!(backends, [Backend::Ort, Backend::Tract, Backend::Tract]);
-        assert!(check(states, &tiers[1]).is_ok());
+        assert!(check(states, fallen[1].as_ref(), 0.0).is_ok());
         // What tract answers is not asked for here: `papilla-server check` and a reload do.
-        assert!(check(states, &tiers[2]).is_err());
+        assert!(check(states, fallen[2].as_ref(), 0.0).is_err());
     }
 }

@@ -3,16 +3,16 @@
 use std::{sync::Arc, time::Duration};
 
 use papilla_engine::{
-    Backend, Card, Choice, EngineError, Ladder, Model,
+    Backend, Card, Choice, Ladder, Model,
+    card::Index,
     ladder::{Kind, SET_NAMES},
     load_with,
 };
 use papilla_proto::{atlas::Atlas, json};
 use serde_json::Value;
 
-use super::{NamedOnly, Tier, assets::Assets, golden};
+use super::{Held, NamedOnly, Tier, golden};
 use crate::{
-    StartError,
     config::Config,
     core::{digest::sha256_hex, latency::Latency},
 };
@@ -29,7 +29,7 @@ pub(super) fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<
         let Some(tier) = tiers.iter().find(|t| rung.model.as_ref() == Some(&t.name)) else {
             return rung.model.is_none();
         };
-        let same = |hash: &String| *hash == tier.model.info().onnx_sha256;
+        let same = |hash: &String| *hash == tier.onnx_sha256;
         let fresh = rung.onnx_sha256.as_ref().is_none_or(same);
         if !fresh {
             tracing::warn!(tier = %tier.name, "ladder.json has figures of another file; measure it anew");
@@ -41,7 +41,7 @@ pub(super) fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<
 
 /// The shipped time of a tier, ms, in what runs it here.
 fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
-    ladder.rung_of(&tier.name)?.time_ms_in(tier.model.backend())
+    ladder.rung_of(&tier.name)?.time_ms_in(tier.backend())
 }
 
 /// Gives tiers the shipped times and errors, marks what no budget picks; the set they are judged on.
@@ -49,7 +49,8 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
     let is_choice = tiers.iter().any(|tier| tier.knows_contact);
     for tier in tiers.iter_mut() {
         let is_narrow = is_choice && tier.kind == Kind::Network && !tier.knows_contact;
-        tier.named_only = is_narrow.then_some(NamedOnly::FePressure);
+        let by_need = tier.on_demand.then_some(NamedOnly::OnDemand);
+        tier.named_only = is_narrow.then_some(NamedOnly::FePressure).or(by_need);
     }
     let ladder = ladder?;
     for tier in tiers.iter() {
@@ -73,7 +74,9 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
     let wide = || tiers.iter().filter(|tier| tier.named_only.is_none());
     let outdone: Vec<_> = tiers.iter().map(|tier| wide().any(|t| beats(t, tier))).collect();
     for (tier, outdone) in tiers.iter_mut().zip(outdone) {
-        tier.named_only = tier.named_only.or(outdone.then_some(NamedOnly::Outdone));
+        if outdone && tier.named_only != Some(NamedOnly::FePressure) {
+            tier.named_only = Some(NamedOnly::Outdone);
+        }
     }
     Some(set.to_owned())
 }
@@ -90,13 +93,13 @@ pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
 }
 
 /// A card, and the same as it was shipped.
-pub(super) struct ReadCard {
-    card: Card,
+pub(crate) struct ReadCard {
+    pub(crate) card: Card,
     shipped: Value,
 }
 
 impl ReadCard {
-    pub(super) fn parse(json: &[u8]) -> Result<Self, String> {
+    pub(crate) fn parse(json: &[u8]) -> Result<Self, String> {
         let json = text(json)?;
         let card = Card::from_json(json).map_err(|error| error.to_string())?;
         let shipped = serde_json::from_str(json).map_err(|error| error.to_string())?;
@@ -111,96 +114,133 @@ pub(crate) struct Loading<'a> {
     pub(crate) default: Option<&'a str>,
     backend: Choice,
     calibration: Duration,
+    /// Whether models that are loaded on demand are loaded now.
+    takes_all: bool,
 }
 
 impl<'a> Loading<'a> {
     pub(crate) fn of(config: &'a Config) -> Self {
         let (default, calibration) = (config.default_tier.as_deref(), config.calibration());
-        Self { default, backend: config.backend, calibration }
+        Self { default, backend: config.backend, calibration, takes_all: false }
     }
 
-    /// Loads one of so many models. Finding out which backends are faster takes half as long as
-    /// the calibration.
-    pub(super) fn model(
-        self,
-        onnx: &[u8],
-        card: &Card,
-        of: usize,
-    ) -> Result<Arc<dyn Model>, EngineError> {
-        let shares = u32::try_from(2 * of).unwrap_or(u32::MAX).max(1);
-        self.backend.load(onnx, Some(card), self.calibration / shares)
+    /// The same, of all models: none waits until it is named.
+    pub(crate) fn of_all(config: &'a Config) -> Self {
+        Self { takes_all: true, ..Self::of(config) }
     }
 
-    /// Tries what was chosen for its speed on golden answers; what fails runs in tract.
+    /// Whether a model is loaded when a client first names it.
+    pub(super) fn is_on_demand(self, name: &str, index: &Index) -> bool {
+        let is_listed = index.on_demand.iter().any(|listed| listed == name);
+        is_listed && !self.takes_all && self.default != Some(name)
+    }
+
+    /// What a tier is expected to run in.
+    fn backend_expected(self) -> Backend {
+        match self.backend {
+            Choice::Auto => Backend::Tract,
+            Choice::Only(backend) => backend,
+        }
+    }
+
+    /// Loads the model called `name`, one of so many. Finding out which backends are faster takes
+    /// half as long as the calibration. What was chosen for its speed is tried on golden answers;
+    /// what fails there runs in tract.
     ///
     /// # Errors
-    /// Tract does not load that model.
-    pub(super) fn hold_to_golden_answers(
+    /// It is unusable, or calls itself otherwise.
+    pub(crate) fn model(
         self,
+        name: &str,
+        onnx: &[u8],
+        card: &Card,
         states: golden::States<'_>,
-        tiers: &mut [Tier],
-        assets: &Assets,
-    ) -> Result<(), StartError> {
-        if self.backend != Choice::Auto {
-            return Ok(());
+        of: usize,
+    ) -> Result<Arc<dyn Model>, Box<dyn std::error::Error>> {
+        let shares = u32::try_from(2 * of).unwrap_or(u32::MAX).max(1);
+        let model = self.backend.load(onnx, Some(card), self.calibration / shares)?;
+        if model.info().name != name {
+            return Err(format!("the model calls itself '{}'", model.info().name).into());
         }
-        let in_tract = |tier: &Tier| {
-            let read = |ending| assets.get(&format!("{}.{ending}", tier.name)).unwrap_or_default();
-            let card = json::text(read("json")).unwrap_or_default();
-            load_with(Backend::Tract, read("onnx"), Some(&Card::from_json(card)?))
-        };
-        golden::fall_back(states, tiers, in_tract)
-            .map_err(|(tier, source)| StartError::Engine { tier, source })
+        if self.backend != Choice::Auto {
+            return Ok(model);
+        }
+        let in_tract = || load_with(Backend::Tract, onnx, Some(card));
+        Ok(golden::fall_back(states, model, card.metrics.relative_l2.p95, in_tract)?)
     }
 }
 
-pub(super) fn load_tier(
-    name: &str,
-    onnx: &[u8],
-    ReadCard { card, shipped }: ReadCard,
-    load: impl Fn(&[u8], &Card) -> Result<Arc<dyn Model>, EngineError>,
-    running: Option<&Tier>,
-) -> Result<Tier, Box<dyn std::error::Error>> {
-    let same = running.filter(|tier| {
-        let hash = &tier.model.info().onnx_sha256;
-        *hash == card.onnx_sha256 && *hash == sha256_hex(onnx)
-    });
-    let model = match same {
-        Some(tier) => {
-            card.require_model(tier.model.info())?;
-            Arc::clone(&tier.model)
+/// What a tier is made of.
+pub(super) struct TierFiles<'a> {
+    pub(super) name: &'a str,
+    /// The model's file; none of a tier that waits for its first use.
+    pub(super) onnx: Option<&'a [u8]>,
+    pub(super) card: ReadCard,
+    pub(super) on_demand: bool,
+}
+
+impl TierFiles<'_> {
+    /// The tier, one of so many to load. If its file is that of `running`, the two share the model,
+    /// its times and its count of sessions.
+    ///
+    /// # Errors
+    /// A file is unusable, or at odds with the other.
+    pub(super) fn load(
+        self,
+        loading: Loading<'_>,
+        states: golden::States<'_>,
+        of: usize,
+        running: Option<&Tier>,
+    ) -> Result<Tier, Box<dyn std::error::Error>> {
+        let Self { name, onnx, card: ReadCard { card, shipped }, on_demand } = self;
+        if card.name != name && onnx.is_none() {
+            return Err(format!("its card is that of '{}'", card.name).into());
         }
-        None => load(onnx, &card)?,
-    };
-    let info = model.info();
-    if info.name != name {
-        return Err(format!("the model calls itself '{}'", info.name).into());
+        let is_of_card = |onnx: &[u8]| sha256_hex(onnx) == card.onnx_sha256;
+        let same = running
+            .filter(|tier| tier.onnx_sha256 == card.onnx_sha256 && onnx.is_none_or(is_of_card));
+        let held = match (same, onnx) {
+            (Some(tier), _) if tier.is_loaded() => Arc::clone(&tier.held),
+            (Some(tier), None) => {
+                // Whoever loads anew may have mended what was broken.
+                tier.held.forgive();
+                Arc::clone(&tier.held)
+            }
+            (None, None) => Arc::default(),
+            (_, Some(onnx)) => Held::loaded(loading.model(name, onnx, &card, states, of)?),
+        };
+        if let Some(model) = held.model() {
+            card.require_model(model.info())?;
+        }
+        let latency = same.map_or_else(
+            || {
+                let latency = Latency::default();
+                latency.expect(milliseconds(card.latency_ms.p50));
+                Arc::new(latency)
+            },
+            |tier| Arc::clone(&tier.latency),
+        );
+        Ok(Tier {
+            name: name.to_owned(),
+            held,
+            on_demand,
+            backend_expected: loading.backend_expected(),
+            kind: Kind::of_network(&card.network),
+            sessions: running.map(|tier| Arc::clone(&tier.sessions)).unwrap_or_default(),
+            pressure_max_pa: card.pressure_range_pa[1],
+            input_statistics_max: card.input_statistics_max,
+            response_max_per_mpa: card.response_max_per_mpa,
+            sed_max_j_per_m3: card.sed_max_j_per_m3,
+            relative_l2_median: card.metrics.relative_l2.median,
+            relative_l2_p95: card.metrics.relative_l2.p95,
+            knows_contact: card.knows_contact(),
+            effects: card.effects,
+            atlas_hash: card.atlas_hash,
+            onnx_sha256: card.onnx_sha256,
+            card: shipped,
+            latency,
+            named_only: None,
+            retired: false,
+        })
     }
-    let latency = same.map_or_else(
-        || {
-            let latency = Latency::default();
-            latency.expect(milliseconds(card.latency_ms.p50));
-            Arc::new(latency)
-        },
-        |tier| Arc::clone(&tier.latency),
-    );
-    Ok(Tier {
-        name: name.to_owned(),
-        kind: Kind::of_network(&info.network),
-        sessions: running.map(|tier| Arc::clone(&tier.sessions)).unwrap_or_default(),
-        effects: info.effects.clone(),
-        atlas_hash: info.atlas_hash.clone(),
-        pressure_max_pa: info.pressure_max_pa,
-        input_statistics_max: card.input_statistics_max,
-        response_max_per_mpa: card.response_max_per_mpa,
-        sed_max_j_per_m3: info.sed_max_j_per_m3,
-        relative_l2_median: card.metrics.relative_l2.median,
-        relative_l2_p95: card.metrics.relative_l2.p95,
-        knows_contact: card.knows_contact(),
-        card: shipped,
-        latency,
-        named_only: None,
-        retired: false,
-        model,
-    })
 }

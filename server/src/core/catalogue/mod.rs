@@ -3,6 +3,7 @@
 pub(crate) mod assets;
 pub(crate) mod calibrate;
 pub(crate) mod golden;
+mod held;
 mod load;
 pub(crate) mod replay;
 #[cfg(test)]
@@ -13,7 +14,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
-use papilla_engine::{Card, card::Index};
+use papilla_engine::card::Index;
 use papilla_metrics::TierLabels;
 use papilla_proto::{
     ErrorCode, Problem,
@@ -25,11 +26,12 @@ use papilla_session_effects as effects;
 
 use self::{
     assets::Assets,
-    load::{ReadCard, judge, load_ladder, load_tier, text},
+    load::{TierFiles, judge, load_ladder, text},
     replay::Replay,
 };
 pub(crate) use self::{
-    load::Loading,
+    held::Held,
+    load::{Loading, ReadCard},
     tier::{NamedOnly, Tier},
 };
 use crate::{
@@ -152,16 +154,34 @@ impl Catalogue {
         let atlas_json = text(read("atlas.json")?).map_err(|e| bad("atlas.json", &e))?;
         let atlas = Atlas::from_json(atlas_json).map_err(|e| bad("atlas.json", &e))?;
         let atlas_json = Bytes::copy_from_slice(atlas_json.as_bytes());
-        note(Step::Listed(&index.models));
+        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
+        let pixels = [skin.pixel_count(), interface.pixel_count()];
+        let replay = match assets.get("replay.json") {
+            Some(json) => Replay::parse(json, pixels).map_err(|e| bad("replay.json", &e))?,
+            None => Replay::default(),
+        };
+        let states = golden::States { replay: &replay, skin: &skin, interface: &interface };
+        let is_late = |name: &String| loading.is_on_demand(name, &index);
+        let at_start: Vec<_> = index.models.iter().filter(|name| !is_late(name)).cloned().collect();
+        note(Step::Listed(&at_start));
         let mut tiers = Vec::with_capacity(index.models.len());
-        let load = |onnx: &[u8], card: &Card| loading.model(onnx, card, index.models.len());
         for name in &index.models {
             let (onnx, file) = (format!("{name}.onnx"), format!("{name}.json"));
-            let bytes = read(&onnx)?;
-            let card = ReadCard::parse(read(&file)?).map_err(|e| bad(&file, &e))?;
+            let on_demand = is_late(name);
             let running =
                 running.and_then(|running| running.tiers.iter().find(|t| t.name == *name));
-            let tier = load_tier(name, bytes, card, load, running).map_err(|e| bad(&onnx, &e))?;
+            // A reload leaves no tier without a model that had one: sessions may render with it.
+            let is_to_load = !on_demand || running.is_some_and(Tier::is_loaded);
+            let bytes = if is_to_load {
+                Some(assets.model(&onnx)?)
+            } else {
+                assets.require_there(&onnx)?;
+                None
+            };
+            let card = ReadCard::parse(read(&file)?).map_err(|e| bad(&file, &e))?;
+            let files = TierFiles { name, onnx: bytes.as_deref(), card, on_demand };
+            let tier =
+                files.load(loading, states, at_start.len(), running).map_err(|e| bad(&onnx, &e))?;
             if tier.atlas_hash != atlas.hash() {
                 let (model, ours) = (&tier.atlas_hash, atlas.hash());
                 return Err(bad(
@@ -176,20 +196,12 @@ impl Catalogue {
         let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {
             StartError::UnknownDefault { name: wanted.to_owned(), known: index.models.join(", ") }
         })?;
-        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
-        let pixels = [skin.pixel_count(), interface.pixel_count()];
-        let replay = match assets.get("replay.json") {
-            Some(json) => Replay::parse(json, pixels).map_err(|e| bad("replay.json", &e))?,
-            None => Replay::default(),
-        };
         let ladder = match assets.get("ladder.json") {
             Some(json) => {
                 Some(load_ladder(json, &atlas, &tiers).map_err(|e| bad("ladder.json", &e))?)
             }
             None => None,
         };
-        let states = golden::States { replay: &replay, skin: &skin, interface: &interface };
-        loading.hold_to_golden_answers(states, &mut tiers, assets)?;
         let judged_on = judge(&mut tiers, ladder.as_ref());
         let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
         let overhead = Overhead::default();
@@ -276,8 +288,8 @@ impl Catalogue {
         self.tiers.iter().enumerate().map(|(place, tier)| TierLabels {
             name: &tier.name,
             atlas_hash: &tier.atlas_hash,
-            onnx_sha256: &tier.model.info().onnx_sha256,
-            backend: &tier.model.info().backend,
+            onnx_sha256: &tier.onnx_sha256,
+            backend: tier.backend_label().unwrap_or("none"),
             is_default: place == self.default,
             is_offered: !tier.retired,
         })
@@ -291,11 +303,11 @@ impl Catalogue {
     /// The tier for a client that named none.
     ///
     /// Without a budget: the default. With one: of the tiers that render
-    /// `effects` and are expected to meet it the most accurate, or else the fastest.
+    /// `effects` and are expected to meet it the most accurate, or else the fastest. Never one that
+    /// is loaded when it is named.
     pub(crate) fn choose(&self, budget_us: Option<u32>, effects: &[String]) -> Option<usize> {
         let Some(budget_us) = budget_us else {
-            let mut fitting =
-                self.offered().filter(|(_, tier)| tier.renders(effects)).map(|(place, _)| place);
+            let mut fitting = self.ready_for(effects).map(|(place, _)| place);
             let default = Some(self.default).filter(|&tier| self.tiers[tier].renders(effects));
             return default.or_else(|| fitting.next());
         };
@@ -318,10 +330,15 @@ impl Catalogue {
             .or_else(|| fitting().min_by_key(|&place| self.predicted_latency_us(place)))
     }
 
+    /// The tiers that render these effects and wait for nobody to name them, each with its place.
+    fn ready_for(&self, effects: &[String]) -> impl Iterator<Item = (usize, &Tier)> {
+        self.offered().filter(move |(_, tier)| !tier.on_demand && tier.renders(effects))
+    }
+
     /// The tiers that a budget may pick: they render these effects, and are not taken by
-    /// name alone, unless no other renders them.
+    /// name alone, unless no other renders them. Never one that is loaded when it is named.
     pub(crate) fn for_budgets(&self, effects: &[String]) -> impl Iterator<Item = usize> {
-        let fitting = move || self.offered().filter(move |(_, tier)| tier.renders(effects));
+        let fitting = move || self.ready_for(effects);
         let is_choice = fitting().any(|(_, tier)| tier.named_only.is_none());
         fitting()
             .filter(move |(_, tier)| !(is_choice && tier.named_only.is_some()))

@@ -6,7 +6,7 @@ use papilla_engine::{Backend, EngineError, Model, ModelInfo, Session, ladder::Ki
 use papilla_proto::atlas::{Atlas, PatchVertices};
 use serde_json::json;
 
-use super::{Catalogue, Tier};
+use super::{Catalogue, Held, Tier};
 use crate::core::latency::Latency;
 
 /// What a model says of itself.
@@ -61,7 +61,10 @@ pub(crate) fn model(name: &str, backend: Backend, factor: f32) -> Arc<dyn Model>
 pub(crate) fn tier(model: Arc<dyn Model>, relative_l2_median: f64) -> Tier {
     Tier {
         name: model.info().name.clone(),
-        model,
+        backend_expected: model.backend(),
+        held: Held::loaded(model),
+        on_demand: false,
+        onnx_sha256: String::new(),
         card: json!({}),
         effects: Vec::new(),
         atlas_hash: String::new(),

@@ -2,11 +2,12 @@
 
 use std::sync::{Arc, atomic::AtomicUsize};
 
-use papilla_engine::{Model, Session, ladder::Kind};
+use papilla_engine::{Backend, Model, Session, ladder::Kind};
 use papilla_proto::InputStatistics;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::held::Held;
 use crate::{
     StartError,
     core::latency::{Latency, probe_map},
@@ -17,7 +18,14 @@ use crate::{
 pub(crate) struct Tier {
     /// Name in the protocol.
     pub(crate) name: String,
-    pub(crate) model: Arc<dyn Model>,
+    /// Its model, once it is loaded.
+    pub(crate) held: Arc<Held>,
+    /// Whether it is loaded when a client first names it, and not before.
+    pub(crate) on_demand: bool,
+    /// SHA-256 of the model's file, as its card names it.
+    pub(crate) onnx_sha256: String,
+    /// What runs it, or is expected to while it is not loaded.
+    pub(crate) backend_expected: Backend,
     /// The card as it was shipped.
     pub(crate) card: Value,
     /// Effects it renders.
@@ -57,6 +65,8 @@ pub(crate) enum NamedOnly {
     Outdone,
     /// It learnt FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
     FePressure,
+    /// It is loaded when a client names it: no budget waits for that.
+    OnDemand,
 }
 
 impl Tier {
@@ -65,18 +75,40 @@ impl Tier {
         effects.iter().all(|effect| self.effects.contains(effect))
     }
 
-    /// A session that has rendered [`probe_map`]: the memory that frames will use has been touched.
-    /// `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold that map and its answer.
+    /// Its model; none before its first use.
+    pub(crate) fn model(&self) -> Option<&Arc<dyn Model>> {
+        self.held.model()
+    }
+
+    /// Whether it answers.
+    pub(crate) fn is_loaded(&self) -> bool {
+        self.model().is_some()
+    }
+
+    /// What runs it, or is expected to while it is not loaded.
+    pub(crate) fn backend(&self) -> Backend {
+        self.model().map_or(self.backend_expected, |model| model.backend())
+    }
+
+    /// The same with its version; none before its first use.
+    pub(crate) fn backend_label(&self) -> Option<&str> {
+        self.model().map(|model| model.info().backend.as_str())
+    }
+
+    /// A session of its model `model` that has rendered [`probe_map`]: the memory that frames will
+    /// use has been touched. `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold that map
+    /// and its answer.
     ///
     /// # Errors
     /// The tier does not run.
     pub(crate) fn warm_session(
         &self,
+        model: &dyn Model,
         pressure_pa: &mut [f32],
         sed_j_per_m3: &mut [f32],
     ) -> Result<Box<dyn Session>, StartError> {
         let failed = |source| StartError::Engine { tier: self.name.clone(), source };
-        let mut session = self.model.session().map_err(failed)?;
+        let mut session = model.session().map_err(failed)?;
         probe_map(self.pressure_max_pa, pressure_pa);
         session.infer(pressure_pa, sed_j_per_m3).map_err(failed)?;
         Ok(session)

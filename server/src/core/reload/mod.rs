@@ -1,5 +1,6 @@
 //! Models that change while the service runs: load, check, warm, swap; or change nothing.
 
+mod first_use;
 mod watch;
 
 use std::sync::{Arc, PoisonError, RwLock, atomic::Ordering};
@@ -35,11 +36,11 @@ pub(crate) struct Reloader {
     config: Config,
     exchange: Exchange,
     metrics: Arc<Metrics>,
-    /// One reload at a time.
+    /// One reload, or one model at its first use, at a time.
     turn: Arc<Mutex<()>>,
 }
 
-/// The turn of one reload; the next begins when it is dropped.
+/// The turn of one reload or first use; the next begins when it is dropped.
 pub(crate) struct Turn(#[expect(dead_code, reason = "held, not read")] OwnedMutexGuard<()>);
 
 /// What a reload changed, by tier names.
@@ -59,7 +60,7 @@ pub(crate) struct Changes {
 pub(crate) enum ReloadError {
     #[error("the models in the binary cannot change; start the service with --models DIR")]
     Embedded,
-    #[error("another reload is under way")]
+    #[error("models are being loaded already; try again in a moment")]
     Busy,
     #[error("the server drains")]
     Draining,
@@ -104,10 +105,10 @@ impl Reloader {
         Arc::clone(&self.running.read().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The turn, if no reload is under way.
+    /// The turn, if nothing is being loaded.
     ///
     /// # Errors
-    /// One is, which is counted.
+    /// Something is, which is counted.
     pub(crate) fn try_begin(&self) -> Result<Turn, ReloadError> {
         Arc::clone(&self.turn).try_lock_owned().map(Turn).map_err(|_| {
             self.metrics.reload_busy();
@@ -115,7 +116,7 @@ impl Reloader {
         })
     }
 
-    /// The turn, once no reload is under way.
+    /// The turn, once nothing is being loaded.
     pub(crate) async fn begin(&self) -> Turn {
         Turn(Arc::clone(&self.turn).lock_owned().await)
     }
@@ -153,8 +154,10 @@ impl Reloader {
         for tier in new.tiers.iter().filter(|tier| is_new(tier, &old)) {
             let name = || tier.name.clone();
             go_on()?;
-            golden::check(new.golden_states(), tier)
-                .map_err(|source| ReloadError::Golden { tier: name(), source })?;
+            if let Some(model) = tier.model() {
+                golden::check(new.golden_states(), model.as_ref(), tier.relative_l2_p95)
+                    .map_err(|source| ReloadError::Golden { tier: name(), source })?;
+            }
             keeps_promises(tier, &old)?;
         }
         let (new, changes) = succeed(new, &old);
@@ -182,7 +185,7 @@ impl Reloader {
 
 /// Whether `old` has no such tier or another model under its name.
 fn is_new(tier: &Tier, old: &Catalogue) -> bool {
-    let same = |t: &&Tier| t.name == tier.name && Arc::ptr_eq(&t.model, &tier.model);
+    let same = |t: &&Tier| t.name == tier.name && Arc::ptr_eq(&t.held, &tier.held);
     old.tiers.iter().find(same).is_none()
 }
 

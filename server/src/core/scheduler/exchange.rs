@@ -8,13 +8,19 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-use papilla_engine::Session;
+use papilla_engine::{Model, Session};
 use papilla_proto::MAP_LEN;
 
-use crate::{StartError, core::catalogue::Catalogue};
+use crate::{
+    StartError,
+    core::catalogue::{Catalogue, Tier},
+};
+
+/// What a thread renders a tier with; nothing before the tier's first use.
+pub(super) type TierSession = Option<Box<dyn Session>>;
 
 /// New sessions, each with its tier's place.
-type Sessions = Vec<(usize, Box<dyn Session>)>;
+type Sessions = Vec<(usize, TierSession)>;
 
 /// The next catalogue, and the sessions it takes beyond those of the last.
 type Delivery = (Arc<Catalogue>, Sessions);
@@ -37,11 +43,7 @@ impl Inbox {
     }
 
     /// Takes what waits; nearly free if there is nothing.
-    pub(super) fn collect(
-        &self,
-        catalogue: &mut Arc<Catalogue>,
-        sessions: &mut Vec<Box<dyn Session>>,
-    ) {
+    pub(super) fn collect(&self, catalogue: &mut Arc<Catalogue>, sessions: &mut Vec<TierSession>) {
         if !self.full.load(Ordering::Acquire) {
             return;
         }
@@ -70,7 +72,8 @@ impl Exchange {
         Self { inboxes }
     }
 
-    /// Warm sessions of the tiers that are `fresh`, for every thread.
+    /// Warm sessions of the tiers that are `fresh`, for every thread; of those that are not loaded,
+    /// their places.
     ///
     /// # Errors
     /// A tier does not run.
@@ -79,13 +82,38 @@ impl Exchange {
         catalogue: &Catalogue,
         fresh: impl Fn(usize) -> bool,
     ) -> Result<Vec<Sessions>, StartError> {
+        let of = |place: usize, tier: &Tier| fresh(place).then(|| tier.model().map(Arc::as_ref));
+        self.sessions(catalogue, of)
+    }
+
+    /// The same of the tier at `place` alone, with this model.
+    ///
+    /// # Errors
+    /// The tier does not run.
+    pub(crate) fn prepare_one(
+        &self,
+        catalogue: &Catalogue,
+        place: usize,
+        model: &dyn Model,
+    ) -> Result<Vec<Sessions>, StartError> {
+        self.sessions(catalogue, |of, _| (of == place).then_some(Some(model)))
+    }
+
+    /// Warm sessions of tiers with the models that `of` gives each, for every thread.
+    fn sessions<'a>(
+        &self,
+        catalogue: &'a Catalogue,
+        of: impl Fn(usize, &'a Tier) -> Option<Option<&'a dyn Model>>,
+    ) -> Result<Vec<Sessions>, StartError> {
         let [mut pressure_pa, mut sed_j_per_m3] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
         let mut all = Vec::with_capacity(self.inboxes.len());
         for _ in &self.inboxes {
             let mut sessions = Sessions::new();
-            for (place, tier) in catalogue.tiers.iter().enumerate().filter(|(i, _)| fresh(*i)) {
-                let session = tier.warm_session(&mut pressure_pa, &mut sed_j_per_m3)?;
-                sessions.push((place, session));
+            for (place, tier) in catalogue.tiers.iter().enumerate() {
+                let Some(model) = of(place, tier) else { continue };
+                let session = model
+                    .map(|model| tier.warm_session(model, &mut pressure_pa, &mut sed_j_per_m3));
+                sessions.push((place, session.transpose()?));
             }
             all.push(sessions);
         }

@@ -8,7 +8,7 @@ use std::{
 };
 
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
-use papilla_engine::{EngineError, Session};
+use papilla_engine::EngineError;
 use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem, flags};
 use papilla_render::{Known, Maps, Read, Rendering, require_finite};
@@ -18,7 +18,7 @@ use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Slot, Times,
     account::{LONG, Spent},
     clock,
-    exchange::Inbox,
+    exchange::{Inbox, TierSession},
     queue::{Next, Queue},
 };
 use crate::{
@@ -35,12 +35,12 @@ pub(super) struct Worker {
     catalogue: Arc<Catalogue>,
     metrics: Arc<Metrics>,
     /// One per tier, in the catalogue's order.
-    sessions: Vec<Box<dyn Session>>,
+    sessions: Vec<TierSession>,
     maps: Maps,
 }
 
 impl Worker {
-    /// Makes and warms a session of every tier.
+    /// Makes and warms a session of every tier that is loaded.
     pub(super) fn prepare(
         catalogue: &Arc<Catalogue>,
         metrics: Arc<Metrics>,
@@ -53,8 +53,9 @@ impl Worker {
         };
         for tier in &catalogue.tiers {
             let Maps { pressure_pa, sed_j_per_m3, .. } = &mut worker.maps;
-            let session = tier.warm_session(pressure_pa, sed_j_per_m3)?;
-            worker.sessions.push(session);
+            let session =
+                tier.model().map(|model| tier.warm_session(&**model, pressure_pa, sed_j_per_m3));
+            worker.sessions.push(session.transpose()?);
         }
         Ok(worker)
     }
@@ -128,8 +129,8 @@ impl Worker {
     /// A fresh session takes the place of one that panicked.
     fn recover(&mut self, index: usize) -> Outcome {
         let tier = &self.catalogue.tiers[index];
-        if let Ok(session) = tier.model.session() {
-            self.sessions[index] = session;
+        if let Some(Ok(session)) = tier.model().map(|model| model.session()) {
+            self.sessions[index] = Some(session);
         }
         Outcome::Failed(problem::internal("the inference panicked", &tier.name))
     }
@@ -184,7 +185,9 @@ impl Worker {
         let mut rendering =
             Rendering::begin(&mut self.maps, finger_here, effects_here, known, read);
         let time_us = rendering.time_us();
-        let session = self.sessions[job.tier].as_mut();
+        let Some(session) = self.sessions[job.tier].as_deref_mut() else {
+            return Err(problem::internal("a frame of a tier that is not loaded", &tier.name));
+        };
         let decoded = Instant::now();
         times.decode = decoded - start;
 

@@ -102,7 +102,9 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
     json!({
         "name": tier.name,
         "kind": tier.kind,
-        "backend": tier.model.info().backend,
+        "backend": tier.backend_label(),
+        "on_demand": tier.on_demand,
+        "loaded": tier.is_loaded(),
         "default": index == catalogue.default,
         "effects": tier.effects,
         "atlas_hash": tier.atlas_hash,

@@ -1,6 +1,9 @@
 //! `POST /v1/sed`: one pressure map in, one SED map out.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use axum::{
     body::Body,
@@ -20,6 +23,7 @@ use crate::{
             render::{Rendered, count, through_pool},
         },
         app::App,
+        first_use,
         gate::Principal,
         negotiate::{self, Query},
     },
@@ -38,7 +42,7 @@ pub(crate) async fn post(
 }
 
 async fn render(
-    app: &App,
+    app: &Arc<App>,
     principal: &Principal,
     uri: &Uri,
     headers: &HeaderMap,
@@ -56,6 +60,7 @@ async fn render(
         Some(name) => catalogue.tier_named(name)?,
         None => catalogue.choose(query.budget(), &[]).unwrap_or(catalogue.default),
     };
+    first_use::wait(app, tier, principal.client.as_ref(), app.timeouts.io).await?;
     let deadline = query.budget().map(|us| received + Duration::from_micros(us.into()));
     let job =
         Job { tier, payload, input, output, received, deadline, options: JobOptions::default() };

@@ -17,6 +17,7 @@ use super::{
 use crate::{
     core::desk::{Cancel, NoResult},
     problem,
+    transport::first_use,
 };
 
 /// Refused hellos after which the session ends.
@@ -153,11 +154,26 @@ async fn meet(
     hello: Hello,
     sealed: Option<Bytes>,
 ) -> Result<Result<(Terms, Hello), Problem>, End> {
+    if let Some(name) = &hello.tier
+        && let Err(problem) = first_use(connection, name).await?
+    {
+        return Ok(Err(problem));
+    }
     let app = Arc::clone(&connection.app);
     let work = move |cancel: &Cancel| {
         terms::meet(&app, &hello, sealed.as_deref(), cancel).map(|terms| (terms, hello))
     };
     Ok(at_desk(connection, work).await?.and_then(|met| met))
+}
+
+/// Waits until the tier called `name` is loaded, as long as its client is there; a problem if that
+/// fails or takes too long. Whether there is such a tier is found later.
+async fn first_use(connection: &mut Connection, name: &str) -> Result<Result<(), Problem>, End> {
+    let (app, client) = (Arc::clone(&connection.app), connection.client.clone());
+    let Some(place) = app.catalogue().find(name) else { return Ok(Ok(())) };
+    let wait_max = app.timeouts.io * 4 / 5;
+    let loading = first_use::wait(&app, place, client.as_ref(), wait_max);
+    connection.while_there(loading).await
 }
 
 /// Does work for a hello at the desk, as long as its client is there; a problem if it is too much.

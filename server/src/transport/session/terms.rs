@@ -210,12 +210,19 @@ fn agree(
             .and_then(|name| catalogue.tier_named(name).ok())
             .filter(|&index| {
                 let tier = &catalogue.tiers[index];
-                !tier.retired && wanted.iter().all(|effect| tier.effects.contains(effect))
+                !tier.retired
+                    && tier.is_loaded()
+                    && wanted.iter().all(|effect| tier.effects.contains(effect))
             })
             .or_else(|| catalogue.choose(budget_us, &wanted))
             .unwrap_or(catalogue.default),
     };
     let tier = &catalogue.tiers[index];
+    if !tier.is_loaded() {
+        // Its first use came to nothing, or a reload came between.
+        let message = format!("tier {} is not loaded; try again in a moment", tier.name);
+        return Err(Problem::new(ErrorCode::Overloaded, message).at("tier"));
+    }
     if let Some(effect) = wanted.iter().find(|effect| !tier.effects.contains(effect)) {
         let (effect, rendered) = (shortened(effect), tier.effects.join(", "));
         let message = format!("tier {} renders {rendered}, but not '{effect}'", tier.name);

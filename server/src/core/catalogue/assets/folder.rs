@@ -30,15 +30,46 @@ const WAIT_MAX: Duration = Duration::from_secs(20);
 const BASE: [&str; 6] =
     ["index.json", "atlas.json", "replay.json", "ladder.json", CONTACT, CONTACT_ERRORS];
 
+/// What there is in a folder.
+#[derive(Debug)]
+pub(super) struct Read {
+    pub(super) files: Files,
+    /// Names of files that were not read: of models that are loaded on demand.
+    pub(super) unread: Vec<String>,
+}
+
 /// The files of `folder` that a service is made of: [`BASE`] and those of the models that its index
-/// names. Strangers that cannot be read are named in the log. None: it was to stop.
+/// names, but for the networks of models to be loaded on demand. Strangers that cannot be read are
+/// named in the log. None: it was to stop.
 ///
 /// # Errors
 /// The folder or one of these files cannot be read, is no file, too large, or not read in time.
 pub(super) fn read(
     folder: &Path,
     is_to_stop: &dyn Fn() -> bool,
-) -> Result<Option<Files>, StartError> {
+) -> Result<Option<Read>, StartError> {
+    in_time(folder, is_to_stop, Folder::read)
+}
+
+/// The bytes of one file of `folder`; none if there is none.
+///
+/// # Errors
+/// It cannot be read, is no file, too large, or not read in time.
+pub(super) fn read_one(folder: &Path, name: &str) -> Result<Option<Vec<u8>>, StartError> {
+    let name = name.to_owned();
+    let one = move |mut folder: Folder<'_>| {
+        folder.take(&name, &HashSet::from([name.clone()]))?;
+        Ok(folder.files.pop().map(|(_, bytes)| bytes.into_owned()))
+    };
+    in_time(folder, &|| false, one).map(Option::flatten)
+}
+
+/// Reads from a folder, within a time; none if it was to stop.
+fn in_time<T: Send + 'static>(
+    folder: &Path,
+    is_to_stop: &dyn Fn() -> bool,
+    read: impl FnOnce(Folder<'_>) -> Result<T, StartError> + Send + 'static,
+) -> Result<Option<T>, StartError> {
     let unreadable = |source| StartError::Folder { folder: folder.to_owned(), source };
     let at = Arc::new(Mutex::new(None));
     let (place, progress) = (folder.to_owned(), Arc::clone(&at));
@@ -46,7 +77,7 @@ pub(super) fn read(
         // Resolved once: a link that is turned meanwhile must not mix two folders.
         let place = fs::canonicalize(&place)
             .map_err(|source| StartError::Folder { folder: place.clone(), source })?;
-        Folder { path: &place, left: FOLDER_BYTES_MAX, at: &progress, files: Vec::new() }.read()
+        read(Folder { path: &place, left: FOLDER_BYTES_MAX, at: &progress, files: Vec::new() })
     };
     match detached(reading, WAIT_MAX, is_to_stop) {
         Ok(result) => result.map(Some),
@@ -80,18 +111,27 @@ struct Folder<'a> {
 }
 
 impl Folder<'_> {
-    fn read(mut self) -> Result<Files, StartError> {
+    fn read(mut self) -> Result<Read, StartError> {
+        let mut unread = Vec::new();
         let listed = names(self.path)
             .map_err(|source| StartError::Folder { folder: self.path.to_owned(), source })?;
         let mut wanted: HashSet<String> = BASE.map(str::to_owned).into();
         for name in BASE {
             self.take(name, &listed)?;
         }
-        for name in self.models() {
-            for file in [format!("{name}.onnx"), format!("{name}.json")] {
-                if wanted.insert(file.clone()) {
-                    self.take(&file, &listed)?;
-                }
+        let Some(index) = self.index() else { return Ok(Read { files: self.files, unread }) };
+        for name in &index.models {
+            let (onnx, card) = (format!("{name}.onnx"), format!("{name}.json"));
+            if wanted.insert(card.clone()) {
+                self.take(&card, &listed)?;
+            }
+            if !wanted.insert(onnx.clone()) {
+                continue;
+            }
+            if !index.on_demand.contains(name) {
+                self.take(&onnx, &listed)?;
+            } else if listed.contains(&onnx) {
+                unread.push(onnx);
             }
         }
         for stranger in listed.iter().filter(|name| !wanted.contains(*name)) {
@@ -99,16 +139,13 @@ impl Folder<'_> {
                 tracing::warn!(file = stranger, reason, "passed over: no model's file");
             }
         }
-        Ok(self.files)
+        Ok(Read { files: self.files, unread })
     }
 
-    /// The models that the index names; none if it is missing or damaged, which is found later.
-    fn models(&self) -> Vec<String> {
-        let index = self.files.iter().find(|(name, _)| name == "index.json");
-        index
-            .and_then(|(_, bytes)| json::text(bytes).ok())
-            .and_then(|text| Index::from_json(text).ok())
-            .map_or_else(Vec::new, |index| index.models)
+    /// The index; none if it is missing or damaged, which is found later.
+    fn index(&self) -> Option<Index> {
+        let (_, bytes) = self.files.iter().find(|(name, _)| name == "index.json")?;
+        Index::from_json(json::text(bytes).ok()?).ok()
     }
 
     /// Reads the file called `name` if the folder has it.
@@ -221,9 +258,9 @@ mod tests {
         fs::write(folder.join("in.onnx"), b"inside").unwrap();
         let index = r#"{"default": "in", "models": ["in", "../x"]}"#;
         fs::write(folder.join("index.json"), index).unwrap();
-        let files = read(&folder, &|| false).unwrap().unwrap();
+        let files = read(&folder, &|| false).unwrap().unwrap().files;
         let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["index.json", "in.onnx"]);
-        assert!(read(&folder, &|| true).unwrap().is_none_or(|files| files.len() == 2));
+        assert!(read(&folder, &|| true).unwrap().is_none_or(|read| read.files.len() == 2));
     }
 }

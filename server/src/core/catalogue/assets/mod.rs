@@ -3,7 +3,10 @@
 mod detached;
 mod folder;
 
-use std::borrow::Cow;
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+};
 
 use crate::{StartError, config::Config};
 
@@ -26,6 +29,8 @@ pub(crate) struct Assets {
     /// What to do if one is missing.
     advice: &'static str,
     files: Files,
+    /// The folder, and names of files there that were not read: of models to be loaded on demand.
+    unread: Option<(PathBuf, Vec<String>)>,
 }
 
 impl Assets {
@@ -47,13 +52,30 @@ impl Assets {
         is_to_stop: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, StartError> {
         let Some(folder) = &config.models else { return Ok(Some(Self::embedded())) };
-        let files = folder::read(folder, is_to_stop)?;
-        Ok(files.map(|files| Self {
+        let read = folder::read(folder, is_to_stop)?;
+        Ok(read.map(|folder::Read { files, unread }| Self::of_folder(folder, files, unread)))
+    }
+
+    /// One file of those that `config` names, without the others.
+    ///
+    /// # Errors
+    /// There is none, or it cannot be read.
+    pub(crate) fn one(config: &Config, file: &str) -> Result<Cow<'static, [u8]>, StartError> {
+        let assets = match &config.models {
+            Some(folder) => Self::of_folder(folder, Vec::new(), vec![file.to_owned()]),
+            None => Self::embedded(),
+        };
+        assets.model(file).map(|bytes| Cow::Owned(bytes.into_owned()))
+    }
+
+    fn of_folder(folder: &Path, files: Files, unread: Vec<String>) -> Self {
+        Self {
             origin: folder.display().to_string(),
             advice: "a folder of models holds index.json, atlas.json, and NAME.onnx and NAME.json \
                      of every model in the index",
             files,
-        }))
+            unread: Some((folder.to_owned(), unread)),
+        }
     }
 
     /// The files built into the binary.
@@ -64,7 +86,32 @@ impl Assets {
             advice: "build with the shipped files in models/, or name a folder of models with \
                      --models DIR",
             files: files.collect(),
+            unread: None,
         }
+    }
+
+    /// Requires that there is a file called `name`, read or not.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn require_there(&self, name: &str) -> Result<(), StartError> {
+        let is_unread =
+            self.unread.iter().any(|(_, unread)| unread.iter().any(|unread| unread == name));
+        if is_unread { Ok(()) } else { self.require(name).map(|_| ()) }
+    }
+
+    /// The bytes of a model's file; one that was not read is read now.
+    ///
+    /// # Errors
+    /// There is none, or it cannot be read.
+    pub(crate) fn model(&self, name: &str) -> Result<Cow<'_, [u8]>, StartError> {
+        if let Some((folder, unread)) = &self.unread
+            && unread.iter().any(|unread| unread == name)
+            && let Some(bytes) = folder::read_one(folder, name)?
+        {
+            return Ok(Cow::Owned(bytes));
+        }
+        self.require(name).map(Cow::Borrowed)
     }
 
     /// The bytes of the file called `name`.

@@ -1,0 +1,92 @@
+//! Models that are loaded when a client first names their tier.
+//!
+//! Neither the start nor memory pays for them before that. It is done once, one model at a time and
+//! never beside a reload; the tier answers when every thread has a warm session of it, and not
+//! before.
+
+use std::sync::Arc;
+
+use papilla_proto::{ErrorCode, Problem};
+
+use super::{Reloader, Turn};
+use crate::{
+    StartError,
+    core::catalogue::{
+        Loading, ReadCard, Tier,
+        assets::Assets,
+        calibrate,
+        golden::{self, GoldenError},
+    },
+};
+
+/// Why a tier does not answer.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum FirstUseError {
+    #[error(transparent)]
+    File(#[from] StartError),
+    #[error("{0}")]
+    Model(String),
+    #[error(transparent)]
+    Golden(#[from] GoldenError),
+}
+
+impl Reloader {
+    /// Loads the model of the tier at `place`, unless it is there, has failed a moment ago or the
+    /// drain has begun: reads it, holds it to its card and to its golden answers, measures it, and
+    /// hands every thread a warm session. Takes seconds; not for a thread that moves bytes.
+    ///
+    /// # Errors
+    /// It is unusable. Nothing has changed then: all other tiers answer as before.
+    pub(crate) fn load_first(&self, _turn: &Turn, place: usize) -> Result<(), Problem> {
+        let catalogue = self.catalogue();
+        let Some(tier) = catalogue.tiers.get(place).filter(|tier| !tier.is_loaded()) else {
+            return Ok(());
+        };
+        if let Some(problem) = tier.held.failed_lately() {
+            return Err(problem);
+        }
+        if self.is_draining() {
+            return Err(super::ReloadError::Draining.into());
+        }
+        let result = self.try_load_first(place);
+        self.metrics.first_use(result.is_ok());
+        result.map_err(|error| {
+            tracing::error!(tier = tier.name, %error, "not loaded at its first use");
+            let message = format!(
+                "tier {} cannot be loaded at its first use: {error}; name another tier, or mend \
+                 the file and reload the models",
+                tier.name
+            );
+            let problem = Problem::new(ErrorCode::BadModel, message).at("tier");
+            tier.held.fail(problem.clone());
+            problem
+        })
+    }
+
+    fn try_load_first(&self, place: usize) -> Result<(), FirstUseError> {
+        let catalogue = self.catalogue();
+        let tier: &Tier = &catalogue.tiers[place];
+        let onnx = Assets::one(&self.config, &format!("{}.onnx", tier.name))?;
+        let unusable = |error: &dyn std::fmt::Display| FirstUseError::Model(error.to_string());
+        // As it was when the tier was listed, which the file's hash has to be that of.
+        let card = ReadCard::parse(tier.card.to_string().as_bytes()).map_err(|e| unusable(&e))?;
+        let states = catalogue.golden_states();
+        let model = Loading::of(&self.config)
+            .model(&tier.name, &onnx, &card.card, states, 1)
+            .map_err(|e| unusable(&e))?;
+        drop(onnx);
+        golden::check(states, model.as_ref(), tier.relative_l2_p95)?;
+        if !self.config.calibration().is_zero() {
+            // The fewest runs there are: no budget picks it.
+            calibrate::measure(tier, model.as_ref(), std::time::Duration::ZERO)?;
+        }
+        let sessions = self.exchange.prepare_one(&catalogue, place, model.as_ref())?;
+        // Threads first: whoever sees that it is loaded may submit a job at once.
+        self.exchange.hand_over(&catalogue, sessions);
+        tier.held.open(Arc::clone(&model));
+        self.metrics.name_tiers(catalogue.tier_labels());
+        let backend = &model.info().backend;
+        tracing::info!(tier = tier.name, backend, "loaded at its first use");
+        Ok(())
+    }
+}
