@@ -17,7 +17,7 @@ const LOOK: Duration = Duration::from_secs(3);
 /// the session had, ends up to ten seconds later.
 const LOOKS: u32 = 5;
 
-/// Gives memory back for some time after each session's end.
+/// Gives memory back for some time after the start and after each session's end.
 pub(crate) struct Giving {
     ticks: Interval,
     over: u64,
@@ -28,7 +28,8 @@ impl Default for Giving {
     fn default() -> Self {
         let mut ticks = interval(LOOK);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        Self { ticks, over: 0, left: 0 }
+        // What the start has used to load, compare and measure models, and no longer does.
+        Self { ticks, over: 0, left: LOOKS }
     }
 }
 
@@ -38,7 +39,7 @@ impl Giving {
         self.ticks.tick().await;
     }
 
-    /// Gives back what is free, if sessions have ended lately; `over` counts them.
+    /// Gives back what is free, if the service has started or sessions have ended lately; `over` counts them.
     pub(crate) fn look(&mut self, over: u64) {
         if over != self.over {
             (self.over, self.left) = (over, LOOKS);

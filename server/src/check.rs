@@ -14,6 +14,7 @@ use crate::{
     config::Config,
     core::catalogue::{Catalogue, Loading, Tier, assets::Assets, calibrate, golden},
     descriptors::Descriptors,
+    processor::Vectors,
     start::load_contact,
     transport::{gate::Gate, moves::Moves, net, tls},
 };
@@ -91,6 +92,8 @@ pub fn check(config: &Config) -> Report {
         Ok(()) => report.good("settings", "they go together".to_owned(), Value::Null),
         Err(error) => report.bad("settings", 2, &error),
     }
+    let vectors = Vectors::here().describe();
+    report.good("processor", vectors.to_owned(), Value::Null);
     match tls::acceptor(config) {
         Ok(Some(_)) => report.good("tls", "certificate and key fit".to_owned(), Value::Null),
         Ok(None) => report.good("tls", "none; plain HTTP".to_owned(), Value::Null),
@@ -147,7 +150,7 @@ pub fn check(config: &Config) -> Report {
     report
 }
 
-/// What the inference threads take, by the sessions of one.
+/// What the inference threads take, by the sessions of one, without those of models on demand.
 fn look_at_threads(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     let threads = config.thread_count();
     let before = resident_bytes();
@@ -156,9 +159,9 @@ fn look_at_threads(report: &mut Report, config: &Config, catalogue: &Catalogue) 
         let model = tier.model()?;
         tier.warm_session(model.as_ref(), &mut maps.pressure_pa, &mut maps.sed_j_per_m3).ok()
     };
+    let at_start = catalogue.tiers.iter().filter(|tier| !tier.on_demand);
     // Err: the model is named below, by its golden answers.
-    let sessions: Vec<_> =
-        catalogue.tiers.iter().filter_map(|tier| warm(tier, &mut maps)).collect();
+    let sessions: Vec<_> = at_start.filter_map(|tier| warm(tier, &mut maps)).collect();
     let grown = resident_bytes().zip(before).map(|(now, before)| now.saturating_sub(before));
     drop(sessions);
     let (detail, values) = match grown {
@@ -217,9 +220,11 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
         );
         let is_default = index == catalogue.default;
         let default = if is_default { ", the default" } else { "" };
+        let on_demand = if tier.on_demand { ", loaded when it is named" } else { "" };
         let values = json!({
             "tier": tier.name,
             "default": is_default,
+            "on_demand": tier.on_demand,
             "onnx_sha256": tier.onnx_sha256,
             "atlas_hash": tier.atlas_hash,
             "backend": model.info().backend,
@@ -228,21 +233,27 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             "predicted_latency_us": predicted_us,
         });
         let backend = &model.info().backend;
-        report.good(&what, format!("{predicted_us} us in {backend}, {answers}{default}"), values);
+        report.good(
+            &what,
+            format!("{predicted_us} us in {backend}, {answers}{default}{on_demand}"),
+            values,
+        );
     }
 }
 
 fn look_at_contact(report: &mut Report, contact: Result<Option<ContactAssets>, StartError>) {
     match contact {
         Ok(Some(contact)) => {
+            contact.measure();
+            let frame_us = contact.frame_us();
             let us = |&(method, us): &(ContactMethod, u64)| format!("{us} us by {method}");
-            let frames: Vec<String> = contact.frame_us.iter().map(us).collect();
+            let frames: Vec<String> = frame_us.iter().map(us).collect();
             let pixels = match contact.pixels {
                 Some(_) => "",
                 None => "; no pixels, since its model names no layers",
             };
             let measured = if contact.errors.is_some() { "" } else { "; errors not measured" };
-            let values = json!({"frame_us": contact.frame_us, "errors": contact.errors});
+            let values = json!({"frame_us": frame_us, "errors": contact.errors});
             let detail = format!("of this finger, {} a frame{pixels}{measured}", frames.join(", "));
             report.good("contact", detail, values);
         }

@@ -41,6 +41,7 @@ mod error;
 pub mod fuzz;
 mod priority;
 mod problem;
+mod processor;
 mod progress;
 mod runtime;
 mod start;
@@ -135,6 +136,7 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
     let (gate, moves) = (Gate::new(config)?, Moves::new(config)?);
     let tls = tls::acceptor(config)?;
     descriptors::raise(config);
+    processor::Vectors::here().warn();
     let bind = |source| StartError::Bind { address: config.bind, source };
     let priorities = Priorities::of(config);
     let io = IoRuntime::start(&priorities).map_err(StartError::Thread)?;

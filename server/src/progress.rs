@@ -9,10 +9,13 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Stage {
-    /// Models are read and checked; requests wait.
+    /// The default tier's model is read and checked; requests wait.
     Loading,
     /// Threads get their sessions; requests wait.
     Warming,
+    /// The contact model and the other tiers' models are read and checked; requests of the default
+    /// tier are served.
+    Completing,
     /// Tiers are measured; requests are served.
     Calibrating,
     /// Over.
@@ -69,6 +72,7 @@ impl State {
         let stage = match self.stage {
             Stage::Loading => "models are being loaded",
             Stage::Warming => "threads are being warmed",
+            Stage::Completing => "the other tiers are being loaded",
             Stage::Calibrating => "tiers are being measured",
             Stage::Ready => "it is ready",
         };

@@ -12,6 +12,7 @@ PACKAGES = {
     "cmake": "cmake",
     "pkg-config": "pkg-config",
     "godot3-server": "godot3-server",
+    "qemu-x86_64": "qemu-user",
     "mcs": "mono-mcs",
     "mono": "mono-runtime",
     "unshare": "util-linux",
@@ -68,6 +69,12 @@ def no_buildah() -> str | None:
 def no_cmake() -> str | None:
     there = shutil.which("cmake") and shutil.which("pkg-config")
     return None if there else "no CMake and pkg-config here: apt install cmake pkg-config"
+
+
+def no_qemu() -> str | None:
+    if os.uname().machine != "x86_64":
+        return "the program is for another kind of processor here"
+    return None if shutil.which("qemu-x86_64") else "no qemu-x86_64 here: apt install qemu-user"
 
 
 def no_haproxy() -> str | None:

@@ -19,6 +19,7 @@ from needs import (
     no_musl,
     no_nightly,
     no_onnxruntime,
+    no_qemu,
     no_slurm,
     no_validator,
     onnxruntime,
@@ -130,7 +131,7 @@ def installs() -> list[Step]:
     return [
         Step(
             "packages",
-            "Debian packages: CalculiX, Chromium, Godot 3, Mono",
+            "Debian packages: CalculiX, Chromium, Godot 3, Mono, QEMU",
             install_packages(),
             installs=f"apt: {packages_missing() or 'nothing'} (56 s where measured)",
         ),
@@ -180,6 +181,13 @@ def full() -> list[Step]:
             "tests/interop/run",
             after=("build", "python"),
             tests_min=5,
+        ),
+        Step(
+            "processors",
+            "networks and contact on processors without AVX2, emulated",
+            "tests/processors/run",
+            after=("build", "packages"),
+            missing=no_qemu,
         ),
         Step(
             "onnxruntime",

@@ -66,12 +66,6 @@ async fn what_arrives_is_the_engines_own_answer() {
     let config = Config { backend, calibration_ms: 0, ..Config::default() };
     let server = papilla_server::start(&config).await.unwrap();
     let address = server.address().to_string();
-    let tiers: Value =
-        serde_json::from_slice(&Request::get("/v1/tiers").send(&address).await.unwrap().body)
-            .unwrap();
-    for tier in tiers["tiers"].as_array().unwrap() {
-        assert!(tier["backend"].as_str().unwrap().starts_with("onnxruntime "), "{tier}");
-    }
     for name in names() {
         let card = Card::from_json(&String::from_utf8(read(&format!("{name}.json"))).unwrap());
         let card = card.unwrap();
@@ -91,6 +85,13 @@ async fn what_arrives_is_the_engines_own_answer() {
             found.len() == MAP_LEN && apart <= 1e-5 * greatest,
             "{name}: {apart} of {greatest}"
         );
+    }
+    // Every tier has been named, so all are loaded.
+    let tiers: Value =
+        serde_json::from_slice(&Request::get("/v1/tiers").send(&address).await.unwrap().body)
+            .unwrap();
+    for tier in tiers["tiers"].as_array().unwrap() {
+        assert!(tier["backend"].as_str().unwrap().starts_with("onnxruntime "), "{tier}");
     }
     server.drain().await.unwrap();
 }

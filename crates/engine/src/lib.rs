@@ -115,20 +115,49 @@ pub fn load_with(
     onnx: &[u8],
     card: Option<&Card>,
 ) -> Result<Arc<dyn Model>, EngineError> {
-    let (proto, info) = checked(onnx, card)?;
-    let model: Arc<dyn Model> = match backend {
-        Backend::Tract => {
-            let by_rows = map_net::find(&proto);
-            map_net::prefer(Arc::new(tract_backend::TractModel::load(&proto, info)?), by_rows)?
-        }
+    match backend {
+        Backend::Tract => aside(|| {
+            let (proto, info) = checked(onnx, card)?;
+            let found = map_net::find(&proto);
+            let plain = Arc::new(tract_backend::TractModel::load(&proto, info)?);
+            tried(plain.as_ref())?;
+            map_net::prefer(plain, found)
+        })?
+        .map(map_net::Preferred::into_model),
         #[cfg(feature = "ort")]
-        Backend::Ort => Arc::new(ort_backend::OrtModel::load(onnx, info)?),
+        Backend::Ort => {
+            let (_, info) = checked(onnx, card)?;
+            let model = ort_backend::OrtModel::load(onnx, info)?;
+            tried(&model)?;
+            Ok(Arc::new(model))
+        }
         #[cfg(not(feature = "ort"))]
-        Backend::Ort => return Err(choice::not_built(backend)),
-    };
+        Backend::Ort => {
+            checked(onnx, card)?;
+            Err(choice::not_built(backend))
+        }
+    }
+}
+
+/// Infers one trial map.
+fn tried(model: &dyn Model) -> Result<(), EngineError> {
     let pressure_pa = trial_map(model.info().pressure_max_pa);
-    model.session()?.infer(&pressure_pa, &mut vec![0.0; MAP_LEN])?;
-    Ok(model)
+    model.session()?.infer(&pressure_pa, &mut vec![0.0; MAP_LEN])
+}
+
+/// Does work on a thread of its own, whose memory is the system's again when it ends. To read and
+/// optimise a network takes many times the memory that is kept of it; on the thread that keeps the
+/// network, what is kept would hold on to pages that are free but for it.
+fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, EngineError> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().name("load".to_owned());
+        let working = thread.spawn_scoped(scope, work).map_err(|error| EngineError::Backend {
+            backend: Backend::Tract,
+            action: "start a thread",
+            reason: error.to_string(),
+        })?;
+        Ok(working.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })
 }
 
 /// A file that has passed the checks of the contract and is its card's, with constants stored in 16

@@ -1,6 +1,9 @@
 //! The contact model of a service, and what a frame takes with it.
 
-use std::{sync::Arc, time::Instant};
+use std::{
+    sync::{Arc, OnceLock},
+    time::Instant,
+};
 
 use papilla_contact::{
     Contact, ContactModel, InterfaceSkin, Method, ModelError, Object, PixelContact, PixelSkin,
@@ -28,13 +31,19 @@ pub struct ContactAssets {
     pub pixels: Option<Arc<PixelSkin>>,
     /// What traction along the skin needs to be felt; none likewise.
     pub interface: Option<Arc<InterfaceSkin>>,
-    /// Time that `shear_energy` adds to a frame, us.
-    pub shear_us: Option<u64>,
-    /// Time of a warm frame under a plate that moves by 10 um, us, by each method that this model
-    /// can serve.
-    pub frame_us: Vec<(ContactMethod, u64)>,
+    /// What things take here, once it is measured.
+    times: OnceLock<Times>,
     /// What methods err with this model; none if nobody measured it.
     pub errors: Option<ContactErrors>,
+}
+
+/// What things take, us.
+#[derive(Debug, Clone, Default)]
+struct Times {
+    /// What `shear_energy` adds to a frame.
+    shear_us: Option<u64>,
+    /// A warm frame under a plate that moves by 10 um, by each method that this model can serve.
+    frame_us: Vec<(ContactMethod, u64)>,
 }
 
 /// Why a contact model cannot be served.
@@ -51,8 +60,7 @@ pub enum AssetsError {
 }
 
 impl ContactAssets {
-    /// Reads a file's bytes, which have to be of this atlas' finger, and times every method.
-    /// `errors` is the file `contact.json` beside it, if there is one; of another model it is
+    /// Reads a file's bytes, which have to be of this atlas' finger. `errors` is the file `contact.json` beside it, if there is one; of another model it is
     /// passed over.
     ///
     /// # Errors
@@ -68,30 +76,62 @@ impl ContactAssets {
         model.require_atlas(atlas.hash())?;
         let pixels = PixelSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
         let interface = InterfaceSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
-        let shear_us = interface.as_ref().map(|of| shear_us(of, model.vertices()));
         let errors = errors.map(|json| contact_errors(json, bytes)).transpose()?.flatten();
+        Ok(Self { model, pixels, interface, times: OnceLock::new(), errors })
+    }
+
+    /// Measures on this thread what every method takes; until then times are expected, not known.
+    /// Takes a second.
+    pub fn measure(&self) {
+        let Self { model, pixels, interface, .. } = self;
         let time = |method: ContactMethod| {
             let chosen = Chosen { method, warning: None };
             let spacing = chosen.pixel_spacing();
             let on_pixels = |spacing| {
-                pixels.as_ref().map(|skin| PixelContact::new(Arc::clone(skin), &model, spacing))
+                pixels.as_ref().map(|skin| PixelContact::new(Arc::clone(skin), model, spacing))
             };
             let pixels = spacing.map(on_pixels);
             // Without layers there are no pixels to be timed.
             let us = match pixels {
                 Some(None) => None,
-                pixels => self::frame_us(&model, chosen.at_vertices(), pixels.flatten()),
+                pixels => self::frame_us(model, chosen.at_vertices(), pixels.flatten()),
             };
             us.map(|us| (method, us))
         };
-        let frame_us = ContactMethod::ALL.into_iter().filter_map(time).collect();
-        Ok(Self { model, pixels, interface, shear_us, frame_us, errors })
+        self.times.get_or_init(|| Times {
+            shear_us: interface.as_ref().map(|of| shear_us(of, model.vertices())),
+            frame_us: ContactMethod::ALL.into_iter().filter_map(time).collect(),
+        });
+    }
+
+    /// Time of a warm frame under a plate that moves by 10 um, us, by each method that this model
+    /// can serve: measured, or until then expected.
+    #[must_use]
+    pub fn frame_us(&self) -> Vec<(ContactMethod, u64)> {
+        if let Some(times) = self.times.get() {
+            return times.frame_us.clone();
+        }
+        let serves = |method: &ContactMethod| {
+            let chosen = Chosen { method: *method, warning: None };
+            chosen.pixel_spacing().is_none() || self.pixels.is_some()
+        };
+        ContactMethod::ALL.into_iter().filter(serves).map(|of| (of, expected_us(of))).collect()
     }
 
     /// Time that a frame is expected to take by this method, us; none if it cannot serve.
     #[must_use]
     pub fn us_by(&self, method: ContactMethod) -> Option<u64> {
-        self.frame_us.iter().find(|(of, _)| *of == method).map(|(_, us)| *us)
+        self.frame_us().into_iter().find(|(of, _)| *of == method).map(|(_, us)| us)
+    }
+
+    /// Time that `shear_energy` adds to a frame, us: measured, or until then expected. None if the
+    /// model names no layers.
+    #[must_use]
+    pub fn shear_us(&self) -> Option<u64> {
+        match self.times.get() {
+            Some(times) => times.shear_us,
+            None => self.interface.as_ref().map(|_| SHEAR_EXPECTED_US),
+        }
     }
 
     /// Time that a frame of this hand is expected to take, us; none if nothing is solved.
@@ -110,6 +150,20 @@ pub fn contact_errors(json: &[u8], model: &[u8]) -> Result<Option<ContactErrors>
     let hash: String = Sha256::digest(model).iter().map(|b| format!("{b:02x}")).collect();
     Ok((errors.contact_sha256 == hash).then_some(errors))
 }
+
+/// What a frame takes on one core of the machine of the reports, us.
+fn expected_us(method: ContactMethod) -> u64 {
+    match method {
+        ContactMethod::Springs => 20,
+        ContactMethod::SmallStrain => 150,
+        ContactMethod::SecondOrder => 300,
+        ContactMethod::CoarsePixels => 500,
+        ContactMethod::Pixels => 1000,
+    }
+}
+
+/// What `shear_energy` adds there.
+const SHEAR_EXPECTED_US: u64 = 500;
 
 /// What traction takes to be felt; the time does not depend on the values.
 fn shear_us(of: &Arc<InterfaceSkin>, vertices: usize) -> u64 {

@@ -1,10 +1,16 @@
-//! From settings to a service that renders, behind a port that is open already: load, warm, serve,
-//! measure.
+//! From settings to a service that renders, behind a port that is open already: load the default
+//! tier, warm, serve, load the other tiers, measure.
 
 mod load;
 mod remeasure;
 
-use std::{borrow::Cow, io, path::Path, sync::Arc, thread};
+use std::{
+    borrow::Cow,
+    io,
+    path::Path,
+    sync::{Arc, mpsc::sync_channel},
+    thread,
+};
 
 use papilla_engine::{Backend, Choice};
 use papilla_metrics::Metrics;
@@ -54,7 +60,8 @@ pub(crate) struct Opened {
     pub(crate) real_time: Option<RealTime>,
 }
 
-/// Loads the models and opens the front; returns once every tier is measured.
+/// Loads the default tier's model and opens the front; then loads the others. Returns once every tier
+/// is measured.
 ///
 /// # Errors
 /// The models are missing or unusable, or do not run; a thread cannot be started; the folder
@@ -62,6 +69,7 @@ pub(crate) struct Opened {
 pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let Parts { config, gate, moves, metrics, progress, front, drain, priorities } = parts;
     let (loaded, loading) = oneshot::channel();
+    let (opened, opening) = sync_channel::<Arc<App>>(1);
     let (measured, measuring) = oneshot::channel();
     let work = {
         let (config, metrics, progress) =
@@ -69,26 +77,24 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
         let priorities = priorities.clone();
         move || {
             priorities.enter(Role::Other);
-            let catalogue = match load(&config, &metrics, &progress, &priorities) {
-                Ok((catalogue, pool, contact)) => {
-                    let to_measure = Arc::clone(&catalogue);
-                    // Err: the start was given up.
-                    if loaded.send(Ok((catalogue, pool, contact))).is_err() {
-                        return;
-                    }
-                    to_measure
-                }
-                Err(error) => {
-                    let _ = loaded.send(Err(error));
-                    return;
-                }
+            let of_default = Assets::of(&config).and_then(|assets| {
+                load(&config, &assets, &metrics, &progress, &priorities).map(|of| (assets, of))
+            });
+            let (assets, of_default) = match of_default {
+                Ok((assets, of)) => (Some(assets), Ok(of)),
+                Err(error) => (None, Err(error)),
             };
-            let _ = measured.send(measure(&config, &catalogue, &progress));
+            // Err: the start was given up, or loading has failed.
+            if let (Ok(()), Some(assets)) = (loaded.send(of_default).map_err(|_| ()), assets)
+                && let Ok(app) = opening.recv()
+            {
+                let _ = measured.send(complete(&config, assets, &app, &progress));
+            }
         }
     };
     // A thread of its own: a runtime that ends would wait for its blocking tasks.
     thread::Builder::new().name("start".to_owned()).spawn(work).map_err(StartError::Thread)?;
-    let (catalogue, pool, contact) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
+    let (catalogue, pool) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     let default_tier = catalogue.tiers[catalogue.default].name.clone();
     let real_time = priorities.report(&metrics);
@@ -96,7 +102,7 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let desk = Desk::start(desk_threads(), step_back).map_err(StartError::Thread)?;
     let parts = (gate, moves, desk);
     let app = App::new(&config, catalogue, metrics, &pool, parts, drain, Arc::clone(&progress));
-    let app = Arc::new(app.with_contact(contact));
+    let app = Arc::new(app);
     if let (true, Some(folder)) = (config.watch_models, &config.models) {
         let (reloader, watched) = (Arc::clone(&app.reloader), folder.clone());
         // What watches has a thread, which is not to have the priority of those that read.
@@ -104,6 +110,8 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
         watching.await.map_err(|_| StartError::WorkerPanicked)?.map_err(StartError::Thread)?;
     }
     front.open(routes::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref()));
+    // Err: it is there to be found that the thread has ended.
+    let _ = opened.send(Arc::clone(&app));
     measuring.await.map_err(|_| StartError::WorkerPanicked)??;
     progress.enter(Stage::Ready, Vec::new());
     if !config.calibration().is_zero() {
@@ -120,13 +128,13 @@ fn desk_threads() -> usize {
 
 fn load(
     config: &Config,
+    assets: &Assets,
     metrics: &Arc<Metrics>,
     progress: &Progress,
     priorities: &Priorities,
-) -> Result<(Arc<Catalogue>, Pool, Option<ContactAssets>), StartError> {
-    let assets = Assets::of(config)?;
-    let loading = Loading::of(config);
-    let catalogue = Catalogue::load_noting(&assets, loading, None, &mut |step| match step {
+) -> Result<(Arc<Catalogue>, Pool), StartError> {
+    let loading = Loading::of_default(config);
+    let catalogue = Catalogue::load_noting(assets, loading, None, &mut |step| match step {
         Step::Listed(names) => progress.enter(Stage::Loading, names.to_vec()),
         Step::Loaded(name) => progress.done(name),
     })?;
@@ -139,8 +147,7 @@ fn load(
     // A slot is in the queue at most once, so this many places are always enough.
     let places = config.max_sessions.get() * FINGERS_MAX + config.max_requests.get();
     let pool = Pool::start(&catalogue, metrics, config.thread_count(), places, priorities)?;
-    let contact = load_contact(config, &assets, &catalogue)?;
-    Ok((catalogue, pool, contact))
+    Ok((catalogue, pool))
 }
 
 /// Holds all loaded tiers to their golden answers: the library of ONNX Runtime is not the one that the models
@@ -198,11 +205,36 @@ fn read_beside(contact: &Path) -> io::Result<Option<Vec<u8>>> {
     }
 }
 
-/// Measures the tiers; the service is open meanwhile, and what disturbs the measurement does not
-/// last, since every frame is measured as well.
-fn measure(config: &Config, catalogue: &Catalogue, progress: &Progress) -> Result<(), StartError> {
+/// Loads the contact model and the tiers that are left, then measures them; the service is open
+/// meanwhile, and what disturbs the measurement does not last, since every frame is measured as well.
+fn complete(
+    config: &Config,
+    assets: Assets,
+    app: &App,
+    progress: &Progress,
+) -> Result<(), StartError> {
+    let (catalogue, reloader) = (app.catalogue(), &app.reloader);
+    let to_come: Vec<usize> = catalogue.to_come().collect();
+    let names = to_come.iter().map(|&place| catalogue.tiers[place].name.clone()).collect();
+    progress.enter(Stage::Completing, names);
+    app.set_contact(load_contact(config, &assets, &catalogue)?);
+    drop(assets);
+    for &place in &to_come {
+        reloader.load_at_start(place, to_come.len() + 1)?;
+        progress.done(&catalogue.tiers[place].name);
+    }
+    let catalogue = app.catalogue();
     let loaded = catalogue.tiers.iter().filter(|tier| tier.is_loaded());
     let names = loaded.map(|tier| tier.name.clone()).collect();
     progress.enter(Stage::Calibrating, names);
-    calibrate::calibrate_noting(catalogue, config.calibration(), &mut |tier| progress.done(tier))
+    calibrate::calibrate_noting(&catalogue, config.calibration(), &mut |tier| progress.done(tier))?;
+    if let Some(contact) = app.contact() {
+        // On a thread of its own, so that its solvers' memory is the system's again.
+        thread::scope(|scope| {
+            let measuring = thread::Builder::new().name("measure".to_owned());
+            measuring.spawn_scoped(scope, || contact.measure()).map(drop)
+        })
+        .map_err(StartError::Thread)?;
+    }
+    Ok(())
 }

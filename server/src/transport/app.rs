@@ -8,7 +8,7 @@ use std::{
 use papilla_metrics::{Metrics, Shed};
 use papilla_proto::{ErrorCode, Problem};
 use papilla_session_contact::ContactAssets;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, SetOnce, watch};
 
 use super::{
     gate::{Gate, Key, Principal},
@@ -44,8 +44,8 @@ pub(crate) struct App {
     pub(crate) progress: Arc<Progress>,
     /// Memory of sessions that are over.
     pub(crate) store: Store,
-    /// The contact model, if there is one.
-    pub(crate) contact: Option<ContactAssets>,
+    /// The contact model, if there is one, once that is known.
+    contact: SetOnce<Option<ContactAssets>>,
     /// Where hellos are worked out.
     pub(crate) desk: Desk<Option<Key>>,
     /// Accounts of clients that post maps.
@@ -81,7 +81,7 @@ impl App {
             drain,
             progress,
             store: Store::new(config.max_sessions.get()),
-            contact: None,
+            contact: SetOnce::new(),
             posters: Posters::default(),
             fingers: Arc::new(Semaphore::new(config.max_fingers.get())),
             sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
@@ -91,9 +91,25 @@ impl App {
         }
     }
 
-    /// The same with a contact model.
-    pub(crate) fn with_contact(self, contact: Option<ContactAssets>) -> Self {
-        Self { contact, ..self }
+    /// From here on it is known whether there is a contact model.
+    pub(crate) fn set_contact(&self, contact: Option<ContactAssets>) {
+        // Err: it is known already.
+        let _ = self.contact.set(contact);
+    }
+
+    /// The contact model; none if there is none, or it is not loaded yet.
+    pub(crate) fn contact(&self) -> Option<&ContactAssets> {
+        self.contact.get().and_then(Option::as_ref)
+    }
+
+    /// Whether it is known by now if there is a contact model.
+    pub(crate) fn knows_contact(&self) -> bool {
+        self.contact.get().is_some()
+    }
+
+    /// Waits until that is known.
+    pub(crate) async fn wait_for_contact(&self) {
+        self.contact.wait().await;
     }
 
     /// What there is to render with now; it may be replaced at any time, so whoever needs it

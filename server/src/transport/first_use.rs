@@ -58,3 +58,51 @@ pub(crate) async fn wait(
         ))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, num::NonZeroUsize, path::Path};
+
+    use super::*;
+    use crate::Config;
+
+    /// Longer than any load.
+    const PATIENCE: Duration = Duration::from_secs(120);
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_wait_ends_in_time_and_the_next_one_finds_what_it_has_begun() {
+        let models = tempfile::tempdir().unwrap();
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models");
+        for file in ["atlas.json", "pico.onnx", "pico.json", "half-space.onnx", "half-space.json"] {
+            fs::copy(shipped.join(file), models.path().join(file)).unwrap();
+        }
+        let index = br#"{"default": "pico", "models": ["pico", "half-space"],
+            "on_demand": ["half-space"]}"#;
+        fs::write(models.path().join("index.json"), index).unwrap();
+        let config = Config {
+            models: Some(models.path().to_owned()),
+            threads: NonZeroUsize::new(1),
+            calibration_ms: 0,
+            ..Config::default()
+        };
+        let server = crate::start(&config).await.unwrap();
+        let app = &server.app;
+        let place = app.catalogue().find("half-space").unwrap();
+        let is_loaded = || app.catalogue().tiers[place].is_loaded();
+        // Something else is being loaded, and takes its time.
+        let turn = app.reloader.begin().await;
+        let late = wait(app, place, None, Duration::from_millis(20)).await.unwrap_err();
+        assert_eq!((late.code, late.field.as_deref()), (ErrorCode::Overloaded, Some("tier")));
+        assert!(late.message.contains("try again") && !is_loaded(), "{late}");
+        drop(turn);
+        // Whoever waits too short has it loaded all the same, sooner or later.
+        while !is_loaded() {
+            match wait(app, place, None, Duration::from_millis(1)).await {
+                Ok(()) => assert!(is_loaded()),
+                Err(problem) => assert_eq!(problem.code, ErrorCode::Overloaded, "{problem}"),
+            }
+        }
+        wait(app, place, None, PATIENCE).await.unwrap();
+        server.drain().await.unwrap();
+    }
+}

@@ -15,7 +15,7 @@ use crate::support::{
 /// The models of every test and `late`, which is loaded on demand. By its card it is the best.
 fn folder() -> TempDir {
     let folder = model_folder();
-    add_model(folder.path(), "late", atlas().hash(), 0, 0.001);
+    add_model(folder.path(), "late", atlas().hash(), 0, 0.03);
     list(folder.path(), &["quick", "slow", "late"]);
     folder
 }
@@ -138,11 +138,11 @@ async fn a_broken_file_is_told_to_whoever_names_it_and_to_nobody_else() {
         match fault {
             "torn" => fs::write(&path, &good[..good.len() / 2]).unwrap(),
             "other" => {
-                add_model_of_gain(models.path(), "late", atlas().hash(), 0, 0.001, 0.7);
+                add_model_of_gain(models.path(), "late", atlas().hash(), 0, 0.03, 0.7);
                 fs::write(&card, &good_card).unwrap();
             }
             // It belongs to its card and answers, but not what the card promises.
-            "wrong" => add_model_of_gain(models.path(), "late", atlas().hash(), 0, 0.001, 1.0),
+            "wrong" => add_model_of_gain(models.path(), "late", atlas().hash(), 0, 0.03, 1.0),
             _ => {}
         }
         let service = start(models).await;

@@ -37,17 +37,26 @@ use net::{Net, Work, Workspace};
 use std::sync::Arc;
 use tract_onnx::pb::ModelProto;
 
-pub(crate) use trial::prefer;
+pub(crate) use trial::{Preferred, prefer};
 
 /// The networks of a model, whose answers are added up.
 #[derive(Clone, Debug)]
 pub(crate) struct Runner(Arc<Vec<Net>>);
 
+/// Networks as a graph has them.
+pub(crate) struct Found(Vec<parts::Parts>);
+
+impl Found {
+    /// The same laid out for the evaluation, in memory of the thread that asks.
+    pub(crate) fn runner(&self) -> Runner {
+        Runner(Arc::new(self.0.iter().map(Net::new).collect()))
+    }
+}
+
 /// Finds out whether a graph is one of these networks, or a mean of several. The constants of the
 /// file have been widened.
-pub(crate) fn find(proto: &ModelProto) -> Option<Runner> {
-    let nets = pattern::find(proto)?.iter().map(Net::new).collect();
-    Some(Runner(Arc::new(nets)))
+pub(crate) fn find(proto: &ModelProto) -> Option<Found> {
+    pattern::find(proto).map(Found)
 }
 
 /// A model that is run so.

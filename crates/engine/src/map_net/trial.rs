@@ -1,11 +1,28 @@
 //! Compares the evaluation by rows with tract's of the same graph, before it is used.
 
-use super::{MapModel, Runner};
-use crate::{EngineError, MAP_LEN, MAP_SIDE_PX, Model, trial_map};
+use super::{Found, MapModel};
+use crate::{EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, trial_map};
 use std::sync::Arc;
 
 /// The answers may differ by this much of the greatest value: rounding.
 pub(super) const DIFFERENCE_MAX: f32 = 1e-5;
+
+/// What is to run a model.
+pub(crate) enum Preferred {
+    Plain(Arc<dyn Model>),
+    /// By rows; the plain graph is not kept.
+    ByRows(ModelInfo, Found),
+}
+
+impl Preferred {
+    /// The model, in memory of the thread that asks.
+    pub(crate) fn into_model(self) -> Arc<dyn Model> {
+        match self {
+            Self::Plain(model) => model,
+            Self::ByRows(info, found) => Arc::new(MapModel::new(info, found.runner())),
+        }
+    }
+}
 
 /// The evaluation by rows if it answers as the plain graph does, else the plain graph.
 ///
@@ -13,16 +30,16 @@ pub(super) const DIFFERENCE_MAX: f32 = 1e-5;
 /// What the plain graph fails with.
 pub(crate) fn prefer(
     plain: Arc<dyn Model>,
-    runner: Option<Runner>,
-) -> Result<Arc<dyn Model>, EngineError> {
-    let Some(runner) = runner else {
+    found: Option<Found>,
+) -> Result<Preferred, EngineError> {
+    let Some(found) = found else {
         if plain.info().network["kind"] == "map_net" {
             let model = &plain.info().name;
             tracing::warn!(model, "not the graph of a network on maps; tract runs it as it stands");
         }
-        return Ok(plain);
+        return Ok(Preferred::Plain(plain));
     };
-    let by_rows = MapModel::new(plain.info().clone(), runner);
+    let by_rows = MapModel::new(plain.info().clone(), found.runner());
     let name = &plain.info().name;
     let mut due = vec![0.0; MAP_LEN];
     let mut found = vec![0.0; MAP_LEN];
@@ -40,16 +57,16 @@ pub(crate) fn prefer(
                     difference,
                     "evaluated by rows it answers otherwise; tract runs the graph as it stands"
                 );
-                return Ok(plain);
+                return Ok(Preferred::Plain(plain));
             }
             Err(error) => {
                 tracing::warn!(model = name, %error, "tract runs the graph as it stands");
-                return Ok(plain);
+                return Ok(Preferred::Plain(plain));
             }
         }
     }
     tracing::debug!(model = name, "evaluated by rows");
-    Ok(Arc::new(by_rows))
+    Ok(Preferred::ByRows(plain.info().clone(), found))
 }
 
 /// The greatest difference over the greatest value that is due.

@@ -114,25 +114,48 @@ pub(crate) struct Loading<'a> {
     pub(crate) default: Option<&'a str>,
     backend: Choice,
     calibration: Duration,
-    /// Whether models that are loaded on demand are loaded now.
-    takes_all: bool,
+    what: What,
+}
+
+/// Which models are loaded at once, beside those that run already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum What {
+    /// The default's; the others of the start when that answers.
+    Default,
+    /// Those that are not loaded on demand.
+    OfStart,
+    All,
 }
 
 impl<'a> Loading<'a> {
     pub(crate) fn of(config: &'a Config) -> Self {
         let (default, calibration) = (config.default_tier.as_deref(), config.calibration());
-        Self { default, backend: config.backend, calibration, takes_all: false }
+        Self { default, backend: config.backend, calibration, what: What::OfStart }
+    }
+
+    /// The same, of the default tier's model alone: it answers before the others are loaded.
+    pub(crate) fn of_default(config: &'a Config) -> Self {
+        Self { what: What::Default, ..Self::of(config) }
     }
 
     /// The same, of all models: none waits until it is named.
     pub(crate) fn of_all(config: &'a Config) -> Self {
-        Self { takes_all: true, ..Self::of(config) }
+        Self { what: What::All, ..Self::of(config) }
     }
 
     /// Whether a model is loaded when a client first names it.
     pub(super) fn is_on_demand(self, name: &str, index: &Index) -> bool {
         let is_listed = index.on_demand.iter().any(|listed| listed == name);
-        is_listed && !self.takes_all && self.default != Some(name)
+        is_listed && self.default != Some(name)
+    }
+
+    /// Whether a model is loaded now.
+    pub(super) fn is_now(self, name: &str, index: &Index) -> bool {
+        match self.what {
+            What::Default => self.default.unwrap_or(&index.default) == name,
+            What::OfStart => !self.is_on_demand(name, index),
+            What::All => true,
+        }
     }
 
     /// What a tier is expected to run in.

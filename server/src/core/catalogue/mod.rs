@@ -171,7 +171,7 @@ impl Catalogue {
             let running =
                 running.and_then(|running| running.tiers.iter().find(|t| t.name == *name));
             // A reload leaves no tier without a model that had one: sessions may render with it.
-            let is_to_load = !on_demand || running.is_some_and(Tier::is_loaded);
+            let is_to_load = loading.is_now(name, &index) || running.is_some_and(Tier::is_loaded);
             let bytes = if is_to_load {
                 Some(assets.model(&onnx)?)
             } else {
@@ -189,8 +189,10 @@ impl Catalogue {
                     &format!("trained on atlas {model}, but atlas.json is {ours}"),
                 ));
             }
+            if tier.is_loaded() {
+                note(Step::Loaded(name));
+            }
             tiers.push(tier);
-            note(Step::Loaded(name));
         }
         let wanted = loading.default.unwrap_or(&index.default);
         let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {
@@ -330,9 +332,16 @@ impl Catalogue {
             .or_else(|| fitting().min_by_key(|&place| self.predicted_latency_us(place)))
     }
 
+    /// Places of the tiers that the start has still to load.
+    pub(crate) fn to_come(&self) -> impl Iterator<Item = usize> {
+        let is_to_come = |tier: &Tier| !tier.on_demand && !tier.is_loaded();
+        self.offered().filter(move |(_, tier)| is_to_come(tier)).map(|(place, _)| place)
+    }
+
     /// The tiers that render these effects and wait for nobody to name them, each with its place.
     fn ready_for(&self, effects: &[String]) -> impl Iterator<Item = (usize, &Tier)> {
-        self.offered().filter(move |(_, tier)| !tier.on_demand && tier.renders(effects))
+        let is_ready = |tier: &Tier| !tier.on_demand && tier.is_loaded();
+        self.offered().filter(move |(_, tier)| is_ready(tier) && tier.renders(effects))
     }
 
     /// The tiers that a budget may pick: they render these effects, and are not taken by

@@ -1,11 +1,13 @@
-//! Models that are loaded when a client first names their tier.
+//! Models that are loaded while the service answers: when a client first names their tier, or by the
+//! start once the default tier answers.
 //!
-//! Neither the start nor memory pays for them before that. It is done once, one model at a time and
-//! never beside a reload; the tier answers when every thread has a warm session of it, and not
+//! For the former neither the start nor memory pays before that. It is done once, one model at a time
+//! and never beside a reload; the tier answers when every thread has a warm session of it, and not
 //! before.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
+use papilla_engine::{Backend, Choice};
 use papilla_proto::{ErrorCode, Problem};
 
 use super::{Reloader, Turn};
@@ -48,8 +50,10 @@ impl Reloader {
         if self.is_draining() {
             return Err(super::ReloadError::Draining.into());
         }
-        let result = self.try_load_first(place);
-        self.metrics.first_use(result.is_ok());
+        let result = self.try_load(place, 1);
+        if tier.on_demand {
+            self.metrics.first_use(result.is_ok());
+        }
         result.map_err(|error| {
             tracing::error!(tier = tier.name, %error, "not loaded at its first use");
             let message = format!(
@@ -63,7 +67,29 @@ impl Reloader {
         })
     }
 
-    fn try_load_first(&self, place: usize) -> Result<(), FirstUseError> {
+    /// Loads the model of the tier at `place`, one of so many, for the start, unless it is there or
+    /// the drain has begun. Waits for its turn; not within a runtime.
+    ///
+    /// # Errors
+    /// It is unusable.
+    pub(crate) fn load_at_start(&self, place: usize, of: usize) -> Result<(), StartError> {
+        let _turn = Turn(Arc::clone(&self.turn).blocking_lock_owned());
+        let catalogue = self.catalogue();
+        let Some(tier) = catalogue.tiers.get(place) else { return Ok(()) };
+        if tier.is_loaded() || tier.retired || self.is_draining() {
+            return Ok(());
+        }
+        self.try_load(place, of).map_err(|error| match error {
+            FirstUseError::File(error) => error,
+            error => StartError::Unusable {
+                file: format!("{}.onnx", tier.name),
+                origin: Assets::origin(&self.config),
+                reason: error.to_string(),
+            },
+        })
+    }
+
+    fn try_load(&self, place: usize, of: usize) -> Result<(), FirstUseError> {
         let catalogue = self.catalogue();
         let tier: &Tier = &catalogue.tiers[place];
         let onnx = Assets::one(&self.config, &format!("{}.onnx", tier.name))?;
@@ -72,13 +98,16 @@ impl Reloader {
         let card = ReadCard::parse(tier.card.to_string().as_bytes()).map_err(|e| unusable(&e))?;
         let states = catalogue.golden_states();
         let model = Loading::of(&self.config)
-            .model(&tier.name, &onnx, &card.card, states, 1)
+            .model(&tier.name, &onnx, &card.card, states, of)
             .map_err(|e| unusable(&e))?;
         drop(onnx);
-        golden::check(states, model.as_ref(), tier.relative_l2_p95)?;
-        if !self.config.calibration().is_zero() {
+        // What the start loads is held to them where an engine is not the one that it was tried with.
+        if tier.on_demand || self.config.backend == Choice::Only(Backend::Ort) {
+            golden::check(states, model.as_ref(), tier.relative_l2_p95)?;
+        }
+        if tier.on_demand && !self.config.calibration().is_zero() {
             // The fewest runs there are: no budget picks it.
-            calibrate::measure(tier, model.as_ref(), std::time::Duration::ZERO)?;
+            calibrate::measure(tier, model.as_ref(), Duration::ZERO)?;
         }
         let sessions = self.exchange.prepare_one(&catalogue, place, model.as_ref())?;
         // Threads first: whoever sees that it is loaded may submit a job at once.
@@ -86,7 +115,7 @@ impl Reloader {
         tier.held.open(Arc::clone(&model));
         self.metrics.name_tiers(catalogue.tier_labels());
         let backend = &model.info().backend;
-        tracing::info!(tier = tier.name, backend, "loaded at its first use");
+        tracing::info!(tier = tier.name, backend, on_demand = tier.on_demand, "loaded");
         Ok(())
     }
 }

@@ -82,8 +82,10 @@ impl Exchange {
         catalogue: &Catalogue,
         fresh: impl Fn(usize) -> bool,
     ) -> Result<Vec<Sessions>, StartError> {
-        let of = |place: usize, tier: &Tier| fresh(place).then(|| tier.model().map(Arc::as_ref));
-        self.sessions(catalogue, of)
+        let tiers = catalogue.tiers.iter().enumerate().filter(|(place, _)| fresh(*place));
+        let fresh: Vec<_> =
+            tiers.map(|(place, tier)| (place, tier, tier.model().map(Arc::as_ref))).collect();
+        self.sessions(&fresh)
     }
 
     /// The same of the tier at `place` alone, with this model.
@@ -96,21 +98,19 @@ impl Exchange {
         place: usize,
         model: &dyn Model,
     ) -> Result<Vec<Sessions>, StartError> {
-        self.sessions(catalogue, |of, _| (of == place).then_some(Some(model)))
+        self.sessions(&[(place, &catalogue.tiers[place], Some(model))])
     }
 
-    /// Warm sessions of tiers with the models that `of` gives each, for every thread.
-    fn sessions<'a>(
+    /// Warm sessions of tiers with their models, if there are any, for every thread.
+    fn sessions(
         &self,
-        catalogue: &'a Catalogue,
-        of: impl Fn(usize, &'a Tier) -> Option<Option<&'a dyn Model>>,
+        tiers: &[(usize, &Tier, Option<&dyn Model>)],
     ) -> Result<Vec<Sessions>, StartError> {
         let [mut pressure_pa, mut sed_j_per_m3] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
         let mut all = Vec::with_capacity(self.inboxes.len());
         for _ in &self.inboxes {
             let mut sessions = Sessions::new();
-            for (place, tier) in catalogue.tiers.iter().enumerate() {
-                let Some(model) = of(place, tier) else { continue };
+            for &(place, tier, model) in tiers {
                 let session = model
                     .map(|model| tier.warm_session(model, &mut pressure_pa, &mut sed_j_per_m3));
                 sessions.push((place, session.transpose()?));

@@ -81,7 +81,7 @@ pub(crate) async fn tiers(State(app): Shared) -> Response {
         json!(catalogue.tiers[catalogue.default].name),
         json!(catalogue.judged_on),
         catalogue.ladder_json,
-        json!(app.contact.as_ref().map(methods)),
+        json!(app.contact().map(methods)),
         catalogue.overhead.us(),
         json!(tiers),
     );
@@ -94,7 +94,7 @@ fn methods(contact: &ContactAssets) -> Vec<Value> {
         let errors = contact.errors.as_ref().map_or(&[][..], |errors| errors.all_of(method));
         json!({"name": method, "contact_us": us, "errors": errors})
     };
-    contact.frame_us.iter().map(method).collect()
+    contact.frame_us().iter().map(method).collect()
 }
 
 fn tier(catalogue: &Catalogue, index: usize) -> Value {

@@ -1,10 +1,12 @@
 //! Hello and ready: at the start of a session, and whenever the client asks for new terms.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
 use bytes::Bytes;
 use papilla_metrics::Shed;
-use papilla_proto::{ClientMessage, ErrorCode, Hello, MessageError, Problem, Ready, ServerMessage};
+use papilla_proto::{
+    ClientMessage, ErrorCode, Hello, MessageError, Problem, Ready, ServerMessage, contact::Input,
+};
 use papilla_session_state::is_sealed;
 use tokio::time::timeout;
 
@@ -154,9 +156,7 @@ async fn meet(
     hello: Hello,
     sealed: Option<Bytes>,
 ) -> Result<Result<(Terms, Hello), Problem>, End> {
-    if let Some(name) = &hello.tier
-        && let Err(problem) = first_use(connection, name).await?
-    {
+    if let Err(problem) = first_use(connection, &hello).await? {
         return Ok(Err(problem));
     }
     let app = Arc::clone(&connection.app);
@@ -166,13 +166,40 @@ async fn meet(
     Ok(at_desk(connection, work).await?.and_then(|met| met))
 }
 
-/// Waits until the tier called `name` is loaded, as long as its client is there; a problem if that
-/// fails or takes too long. Whether there is such a tier is found later.
-async fn first_use(connection: &mut Connection, name: &str) -> Result<Result<(), Problem>, End> {
+/// Waits until what a hello needs is loaded, as long as its client is there: the tier that it names,
+/// or those that its budget may choose from, and the contact model if it may ask for that. A problem
+/// if that fails or takes too long. Whether there is such a tier is found later.
+async fn first_use(connection: &mut Connection, hello: &Hello) -> Result<Result<(), Problem>, End> {
     let (app, client) = (Arc::clone(&connection.app), connection.client.clone());
-    let Some(place) = app.catalogue().find(name) else { return Ok(Ok(())) };
+    let catalogue = app.catalogue();
+    let places: Vec<usize> = match (&hello.tier, hello.budget_us) {
+        (Some(name), _) => catalogue.find(name).into_iter().collect(),
+        (None, Some(1..)) => catalogue.to_come().collect(),
+        (None, Some(0) | None) => Vec::new(),
+    };
+    let is_loaded = places.iter().all(|&place| catalogue.tiers[place].is_loaded());
+    let needs_contact =
+        hello.input.unwrap_or_default() != Input::Pressure || !hello.effects.is_empty();
+    if is_loaded && (app.knows_contact() || !needs_contact) {
+        return Ok(Ok(()));
+    }
     let wait_max = app.timeouts.io * 4 / 5;
-    let loading = first_use::wait(&app, place, client.as_ref(), wait_max);
+    let last = Instant::now() + wait_max;
+    let loading = async {
+        if needs_contact && timeout(wait_max, app.wait_for_contact()).await.is_err() {
+            app.metrics.shed(Shed::Hellos);
+            let message = format!(
+                "the contact model is being loaded, which takes longer than {wait_max:?}; try \
+                 again in a moment"
+            );
+            return Err(Problem::new(ErrorCode::Overloaded, message));
+        }
+        for place in places {
+            let left = last.saturating_duration_since(Instant::now());
+            first_use::wait(&app, place, client.as_ref(), left).await?;
+        }
+        Ok(())
+    };
     connection.while_there(loading).await
 }
 

@@ -14,7 +14,7 @@ use papilla_proto::{
     error::shortened,
     spikes::PlacedUnit,
 };
-use papilla_session_contact::{Hand, Skin};
+use papilla_session_contact::{ContactAssets, Hand, Skin};
 use papilla_session_effects::Effects;
 use papilla_session_state::tier_of;
 use tokio::sync::OwnedSemaphorePermit;
@@ -145,7 +145,7 @@ fn hand(
     cancel: &Cancel,
 ) -> Result<(Hand, OwnedSemaphorePermit), Problem> {
     let places = app.admit_fingers(places(hello))?;
-    let contact = app.contact.as_ref();
+    let contact = app.contact();
     let skin = Skin {
         atlas: &catalogue.atlas,
         raster: &catalogue.skin,
@@ -238,7 +238,7 @@ fn agree(
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
     let (hand, fingers) = hand(app, &catalogue, hello, cancel)?;
-    let contact_us = app.contact.as_ref().and_then(|contact| contact.us_of(&hand));
+    let contact_us = app.contact().and_then(|contact| contact.us_of(&hand));
     let mut effects = Vec::new();
     for _ in hand.fingers() {
         still_asked(cancel)?;
@@ -281,7 +281,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
     } else {
         catalogue.overhead.us()
     };
-    let shear_us = app.contact.as_ref().and_then(|contact| contact.shear_us);
+    let shear_us = app.contact().and_then(ContactAssets::shear_us);
     let feels_shear = terms.info.names.contains(&RuntimeEffect::ShearEnergy);
     let predicted_latency_us = of_tier
         .saturating_add(contact_us.unwrap_or(0))
@@ -304,7 +304,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         hand.sections().iter().copied().chain(moved).collect()
     };
     let method = hand.method();
-    let errors = app.contact.as_ref().and_then(|contact| contact.errors.as_ref());
+    let errors = app.contact().and_then(|contact| contact.errors.as_ref());
     Ready {
         version: PROTOCOL_VERSION.into(),
         session: number,

@@ -30,7 +30,8 @@ impl Pair {
     fn new(name: &str) -> Self {
         let (proto, info) = checked(&read(name), None).unwrap();
         let max_pa = info.pressure_max_pa;
-        let by_rows = MapModel::new(info.clone(), find(&proto).unwrap()).session().unwrap();
+        let by_rows =
+            MapModel::new(info.clone(), find(&proto).unwrap().runner()).session().unwrap();
         let plain = TractModel::load(&proto, info).unwrap().session().unwrap();
         Self { plain, by_rows, max_pa }
     }
@@ -52,7 +53,7 @@ fn map_networks_are_found_and_others_are_not() {
         assert!(model.info().backend.ends_with(" by rows"), "{name}");
         let (proto, _) = checked(&read(name), None).unwrap();
         let count = if name == "large-maps" { 3 } else { 1 };
-        assert_eq!(find(&proto).map(|runner| runner.0.len()), Some(count), "{name}");
+        assert_eq!(find(&proto).map(|found| found.0.len()), Some(count), "{name}");
     }
     for name in ["half-space", "s1-base16"] {
         let (proto, _) = checked(&read(name), None).unwrap();
@@ -248,7 +249,7 @@ fn what_is_answered_otherwise_is_left_to_tract() {
         raw[..4].copy_from_slice(&0.5_f32.to_le_bytes());
     }));
     let plain: Arc<dyn Model> = Arc::new(TractModel::load(&proto, info).unwrap());
-    let kept = prefer(Arc::clone(&plain), other).unwrap();
+    let kept = prefer(Arc::clone(&plain), other).unwrap().into_model();
     assert!(Arc::ptr_eq(&kept, &plain));
 }
 
@@ -263,7 +264,7 @@ fn weights_that_are_denormal_numbers_are_none() {
     };
     let (_, info) = checked(&read("nano"), None).unwrap();
     let proto = altered(tiny);
-    let by_rows = MapModel::new(info.clone(), find(&proto).unwrap()).session().unwrap();
+    let by_rows = MapModel::new(info.clone(), find(&proto).unwrap().runner()).session().unwrap();
     let max_pa = info.pressure_max_pa;
     let plain = TractModel::load(&proto, info).unwrap().session().unwrap();
     let apart = Pair { plain, by_rows, max_pa }.apart(&crate::trial_map(max_pa));

@@ -32,7 +32,7 @@ const BASE: [&str; 6] =
 
 /// What there is in a folder.
 #[derive(Debug)]
-pub(super) struct Read {
+pub(super) struct Found {
     pub(super) files: Files,
     /// Names of files that were not read: of models that are loaded on demand.
     pub(super) unread: Vec<String>,
@@ -47,8 +47,8 @@ pub(super) struct Read {
 pub(super) fn read(
     folder: &Path,
     is_to_stop: &dyn Fn() -> bool,
-) -> Result<Option<Read>, StartError> {
-    in_time(folder, is_to_stop, Folder::read)
+) -> Result<Option<Found>, StartError> {
+    in_time(folder, is_to_stop, |folder| folder.read())
 }
 
 /// The bytes of one file of `folder`; none if there is none.
@@ -111,7 +111,7 @@ struct Folder<'a> {
 }
 
 impl Folder<'_> {
-    fn read(mut self) -> Result<Read, StartError> {
+    fn read(mut self) -> Result<Found, StartError> {
         let mut unread = Vec::new();
         let listed = names(self.path)
             .map_err(|source| StartError::Folder { folder: self.path.to_owned(), source })?;
@@ -119,7 +119,7 @@ impl Folder<'_> {
         for name in BASE {
             self.take(name, &listed)?;
         }
-        let Some(index) = self.index() else { return Ok(Read { files: self.files, unread }) };
+        let Some(index) = self.index() else { return Ok(Found { files: self.files, unread }) };
         for name in &index.models {
             let (onnx, card) = (format!("{name}.onnx"), format!("{name}.json"));
             if wanted.insert(card.clone()) {
@@ -139,7 +139,7 @@ impl Folder<'_> {
                 tracing::warn!(file = stranger, reason, "passed over: no model's file");
             }
         }
-        Ok(Read { files: self.files, unread })
+        Ok(Found { files: self.files, unread })
     }
 
     /// The index; none if it is missing or damaged, which is found later.

@@ -18,6 +18,9 @@ pub(crate) const CONTACT_ERRORS: &str = "contact.json";
 /// The shipped models, cards, atlas, replay and contact model, as they were when the binary was built.
 const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
+/// The origin of those.
+const EMBEDDED: &str = "the binary";
+
 /// Files by name.
 type Files = Vec<(String, Cow<'static, [u8]>)>;
 
@@ -53,7 +56,7 @@ impl Assets {
     ) -> Result<Option<Self>, StartError> {
         let Some(folder) = &config.models else { return Ok(Some(Self::embedded())) };
         let read = folder::read(folder, is_to_stop)?;
-        Ok(read.map(|folder::Read { files, unread }| Self::of_folder(folder, files, unread)))
+        Ok(read.map(|folder::Found { files, unread }| Self::of_folder(folder, files, unread)))
     }
 
     /// One file of those that `config` names, without the others.
@@ -66,6 +69,14 @@ impl Assets {
             None => Self::embedded(),
         };
         assets.model(file).map(|bytes| Cow::Owned(bytes.into_owned()))
+    }
+
+    /// Where the files are from that `config` names, for messages.
+    pub(crate) fn origin(config: &Config) -> String {
+        match &config.models {
+            Some(folder) => folder.display().to_string(),
+            None => EMBEDDED.to_owned(),
+        }
     }
 
     fn of_folder(folder: &Path, files: Files, unread: Vec<String>) -> Self {
@@ -82,7 +93,7 @@ impl Assets {
     fn embedded() -> Self {
         let files = MODELS.iter().map(|&(name, bytes)| (name.to_owned(), Cow::Borrowed(bytes)));
         Self {
-            origin: "the binary".to_owned(),
+            origin: EMBEDDED.to_owned(),
             advice: "build with the shipped files in models/, or name a folder of models with \
                      --models DIR",
             files: files.collect(),

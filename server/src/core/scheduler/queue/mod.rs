@@ -58,6 +58,9 @@ struct State {
     arrivals: u64,
     /// Turns of heavy accounts that have not ended.
     heavy_running: usize,
+    /// Threads that wait for an arrival: only they have to be woken, and a wake-up is a call of the
+    /// system whether anybody waits or not.
+    asleep: usize,
     light_seen: Option<Instant>,
     light_for: Duration,
     closed: bool,
@@ -199,6 +202,7 @@ impl Queue {
             clock: Duration::ZERO,
             arrivals: 0,
             heavy_running: 0,
+            asleep: 0,
             light_seen: None,
             light_for: LIGHT_FOR,
             closed: false,
@@ -217,16 +221,25 @@ impl Queue {
             return false;
         }
         state.enter(slot, Instant::now());
+        let is_asleep = state.asleep > 0;
         drop(state);
-        self.arrival.notify_one();
+        if is_asleep {
+            self.arrival.notify_one();
+        }
         true
     }
 
     /// Ends a turn. With `is_again` its slot has another job; closed or not, that was accepted.
     pub(super) fn done(&self, turn: Turn, spent: Spent, is_again: bool) {
-        self.state().end(turn, spent, is_again, Instant::now());
-        // Its slot waits again, or a heavy account waited for the end of a heavy turn.
-        self.arrival.notify_one();
+        let mut state = self.state();
+        state.end(turn, spent, is_again, Instant::now());
+        // Its slot waits again, or a heavy account waited for the end of a heavy turn. Where nothing
+        // waits, another thread would be woken for nothing after every frame.
+        let is_to_wake = state.asleep > 0 && (state.slots > 0 || state.closed);
+        drop(state);
+        if is_to_wake {
+            self.arrival.notify_one();
+        }
     }
 
     /// The slot whose turn it is; waits up to `wait` for one.
@@ -245,8 +258,10 @@ impl Queue {
             if left.is_zero() {
                 return Next::Nothing;
             }
+            state.asleep += 1;
             let woken = self.arrival.wait_timeout(state, left);
             (state, _) = woken.unwrap_or_else(PoisonError::into_inner);
+            state.asleep -= 1;
         }
     }
 
