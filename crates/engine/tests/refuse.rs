@@ -276,7 +276,16 @@ fn cards_and_indices_are_checked_when_read() {
     let misspelt = r#"{"default":"a","models":["a"],"defualt":"b"}"#;
     let error = Index::from_json(misspelt).unwrap_err().to_string();
     assert!(error.contains("defualt"), "{error}");
-    for bad in [r#"{"default":"c","models":["a","b"]}"#, "{}", r#"{"default":1,"models":[]}"#] {
+    assert!(index.on_demand.is_empty());
+    let late = Index::from_json(r#"{"default":"a","models":["a","b"],"on_demand":["b"]}"#).unwrap();
+    assert_eq!(late.on_demand, ["b"]);
+    for bad in [
+        r#"{"default":"c","models":["a","b"]}"#,
+        "{}",
+        r#"{"default":1,"models":[]}"#,
+        r#"{"default":"a","models":["a","b"],"on_demand":["c"]}"#,
+        r#"{"default":"a","models":["a","b"],"on_demand":["b","a"]}"#,
+    ] {
         let error = Index::from_json(bad).unwrap_err();
         assert!(matches!(error, EngineError::BadIndex { .. }), "{error}");
         assert!(!error.to_string().contains("card"), "{error}");

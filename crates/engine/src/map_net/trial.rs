@@ -11,7 +11,7 @@ pub(super) const DIFFERENCE_MAX: f32 = 1e-5;
 pub(crate) enum Preferred {
     Plain(Arc<dyn Model>),
     /// By rows; the plain graph is not kept.
-    ByRows(ModelInfo, Found),
+    ByRows(Box<ModelInfo>, Found),
 }
 
 impl Preferred {
@@ -19,7 +19,7 @@ impl Preferred {
     pub(crate) fn into_model(self) -> Arc<dyn Model> {
         match self {
             Self::Plain(model) => model,
-            Self::ByRows(info, found) => Arc::new(MapModel::new(info, found.runner())),
+            Self::ByRows(info, found) => Arc::new(MapModel::new(*info, found.runner())),
         }
     }
 }
@@ -30,16 +30,16 @@ impl Preferred {
 /// What the plain graph fails with.
 pub(crate) fn prefer(
     plain: Arc<dyn Model>,
-    found: Option<Found>,
+    networks: Option<Found>,
 ) -> Result<Preferred, EngineError> {
-    let Some(found) = found else {
+    let Some(networks) = networks else {
         if plain.info().network["kind"] == "map_net" {
             let model = &plain.info().name;
             tracing::warn!(model, "not the graph of a network on maps; tract runs it as it stands");
         }
         return Ok(Preferred::Plain(plain));
     };
-    let by_rows = MapModel::new(plain.info().clone(), found.runner());
+    let by_rows = MapModel::new(plain.info().clone(), networks.runner());
     let name = &plain.info().name;
     let mut due = vec![0.0; MAP_LEN];
     let mut found = vec![0.0; MAP_LEN];
@@ -66,7 +66,7 @@ pub(crate) fn prefer(
         }
     }
     tracing::debug!(model = name, "evaluated by rows");
-    Ok(Preferred::ByRows(plain.info().clone(), found))
+    Ok(Preferred::ByRows(Box::new(plain.info().clone()), networks))
 }
 
 /// The greatest difference over the greatest value that is due.
