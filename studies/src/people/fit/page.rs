@@ -63,8 +63,8 @@ impl Fit {
         }
         let _ = write!(
             text,
-            "\n*Known to* is the standard error, as a share of the way between the bounds; 100 % says that \
-             the rows do not determine the constant. Half the sum of the squared residuals falls from {:.3} to \
+            "\n*Known to* is the standard error of the constant, as a share of the distance between its \
+             bounds on a logarithmic scale; at 100 % the rows do not determine it. Half the sum of the squared residuals falls from {:.3} to \
              {:.3} in {} evaluations ({}), {:.0} s of processor time.\n\n## Rows\n\n| quantity | people | at \
              the start | at the end | weighted residual at the end |\n|---|---|---|---|---|\n",
             self.cost[0],
@@ -109,8 +109,8 @@ impl Fit {
         let stays = 1.0 - s.share.iter().sum::<f64>();
         let _ = write!(
             text,
-            "\nPeople: {} %. Times {:?} s, shares {:?}; a share of {:.3} stays, so a sudden strain meets {:.0} times \
-             the modulus of a held one.\n",
+            "\nPeople: {} %. The relaxation times are {:?} s and their shares {:?}. A share of {:.3} stays, so the \
+             modulus against a sudden strain is {:.0} times that against a held one.\n",
             s.people_percent,
             s.time_s,
             s.share.iter().map(|g| (1e4 * g).round() / 1e4).collect::<Vec<_>>(),

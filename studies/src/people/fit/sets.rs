@@ -48,8 +48,9 @@ impl Sets {
     /// The tables of the page.
     pub(super) fn page(&self, text: &mut String) {
         text.push_str(
-            "\n## What it does to every row\n\nBoth sets are on the even coarse mesh. The default set on the graded \
-             mesh: [comparison](human.md#rows); the difference is what the coarse mesh costs.\n\n| quantity | people \
+            "\n## What it does to every row\n\nBoth sets are on the even coarse mesh. The \
+                [comparison](human.md#rows) has the default set on the graded mesh; the \
+                difference is the error of the coarse mesh.\n\n| quantity | people \
              | default set | verdict | fitted set | verdict | what would bring the fitted set nearer \
              |\n|---|---|---|---|---|---|---|\n",
         );
@@ -70,9 +71,10 @@ impl Sets {
             return;
         }
         text.push_str(
-            "\n## What it does to maps\n\nThe fitted set against the default set at the same force, on the even \
-             coarse mesh; relative L2 over the vertices. SED is the strain energy density.\nThe depths are those of \
-             the default and of the fitted finger.\n\n| indenter | force, N | depths, mm | pressure, L2 | peak of \
+            "\n## What it does to maps\n\nMaps with the fitted set against maps with the default set at \
+             the same force, both on the even coarse mesh. L2 is the relative L2 difference over the vertices. \
+             The peaks are changes of the greatest value. SED is the strain energy density. *Depths* are those \
+             of the default and of the fitted finger.\n\n| indenter | force, N | depths, mm | pressure, L2 | peak of \
              pressure | SED at the interface, L2 | peak of SED |\n|---|---|---|---|---|---|---|\n",
         );
         for c in &self.maps {

@@ -79,7 +79,9 @@ impl Report {
     fn plates(&self, text: &mut String) {
         let _ = write!(
             text,
-            "\n## Plates\n\n![Force under a plate]({PICTURES}/force.svg)\n\nEvery fourth state; all of them are in \
+            "\n## Plates\n\n![Force under a plate]({PICTURES}/force.svg)\n\nThe plate without \
+                friction, pressed step by step. The table holds every fourth state; all of them \
+                are in \
              [human-plates.csv](human-plates.csv).\n\n"
         );
         text.push_str("| plate | depth, mm | force, N | stiffness, N/mm | contact area, mm2 |\n");

@@ -26,21 +26,24 @@ pub(super) fn afferents(text: &mut String, found: &Afferents) {
     let _ = write!(
         text,
         "\n## SA1 rates\n\nThe rate of a fibre is taken as `gain (felt - threshold)`, and as 0 where that is \
-         negative. Gain and threshold are fitted to the rates at the smallest force alone; the rates at the \
-         other forces, and the profiles along the skin, test them. The threshold is not negative, since SA1 \
-         fibres are silent at rest. The column *either sign* is without this bound. A negative R2 says that \
-         the mean rate would be a better prediction. *Growth* is what is felt \
-         under the last sphere over what is felt under the first, at the smallest force; the measured rate \
-         grows {people:.1} times. States lie within {:.1} % of their force, and what is felt is interpolated to \
-         it. Energy and work differ by {:.2} % at most. All spheres took {:.0} s of processor time.\n\n",
+         negative. Gain and threshold are fitted to the rates at the smallest force alone. They \
+         are tested on the rates at the other forces, and on the *profiles*, which are the rates \
+         at several distances from the sphere's middle. The threshold is not negative, since SA1 \
+         fibres are silent at rest; the column *either sign* is without this bound. R2 is the coefficient \
+         of determination: 1 is a perfect prediction, and a negative R2 says that the mean rate would be a \
+         better prediction. *Growth* is the ratio of the stimulus under the most curved sphere to that under \
+         the least curved one, at the smallest force; the measured rate grows {people:.1} times. *Peaks* are \
+         the distances from the sphere's middle at which the two profiles are greatest, with those of the \
+         measured profiles in brackets. The force of each state is within {:.1} % of the force of the \
+         experiment, and the stimulus is interpolated to it. Energy and work differ by {:.2} % at most. All spheres took {:.0} s of processor time.\n\n",
         100.0 * found.force_missed_max,
         100.0 * found.energy_vs_work_max,
         found.solve_s
     );
     explained(text, found);
     text.push_str(
-        "The table holds SED at the interface, and each stimulus at the depth at which it explains the rates that were \
-         not fitted best. All depths are in [human-felt.csv](human-felt.csv), and measured and predicted rates in \
+        "The table holds SED at the interface, and every stimulus at the depth at which its R2 \
+            of the rates that were not fitted is greatest. All depths are in [human-felt.csv](human-felt.csv), and measured and predicted rates in \
          [human-rates.csv](human-rates.csv).\n\n",
     );
     text.push_str(
@@ -165,8 +168,10 @@ fn explained(text: &mut String, found: &Afferents) {
 /// How far what is felt moves on a finer mesh: the worst of all depths.
 pub(super) fn mesh_errors(text: &mut String, errors: &[MeshError]) {
     text.push_str(
-        "\n## The mesh's own error\n\nHow far what is felt under the sphere's middle differs from the next finer mesh, \
-         as the largest of all forces. The table holds the worst depth; all of them are in \
+        "\n## The mesh's own error\n\nHow far each stimulus under the sphere's middle differs \
+            from that on the next finer mesh, at the force where the difference is greatest. The \
+            table holds the depth and the sphere with the greatest difference; all of them are \
+            in \
          [human-mesh.csv](human-mesh.csv).\n\n| felt | curvature of the sphere, 1/m | difference |\n|---|---|---|\n",
     );
     for stimulus in Stimulus::ALL {
