@@ -10,6 +10,19 @@ use tokio::time::{Interval, MissedTickBehavior, interval};
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
+/// Has the system give memory in pages of 4 KiB. mimalloc asks for pages of 2 MiB, each of which is
+/// there as a whole for the little that stays of what the start has used: 27 of 48 MB with one
+/// network. Neither networks nor contact get slower by it.
+#[cfg(target_os = "linux")]
+pub(crate) fn take_small_pages() {
+    // Err: the system has no pages of 2 MiB.
+    let _ = rustix::thread::disable_transparent_huge_pages(true);
+}
+
+/// Other systems give pages as they do.
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn take_small_pages() {}
+
 /// How often sessions that are over are looked for.
 const LOOK: Duration = Duration::from_secs(3);
 
