@@ -200,7 +200,7 @@ def full() -> list[Step]:
             tests_min=23,
             missing=no_onnxruntime,
         ),
-        Step("client-python", "the Python client", f"{client} python", ("build", "python"), 72),
+        Step("client-python", "the Python client", f"{client} python", ("build", "python"), 120),
         Step("client-cpp", "the C++ client", f"{client} cpp", ("build", "packages"), 33),
         Step("client-c", "the native library from C and C++", f"{client} c", ("build", "packages"), 20),
         Step("client-rust", "the Rust client", f"{client} rust", ("build", "packages"), 33, ("doc",)),

@@ -7,9 +7,14 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 - `Session`, `AsyncSession`: many maps, or where things are, over a WebSocket; the latest frame wins
 - `render`: a series of frames in one call, as arrays with units and files (`Series`)
 - `SpikeTrains`: when the touch units of a finger fire, as files
+- `sensors`: readings of an array of taxels to pressure, SED, rates and spikes
+- `meshes`: STL, OBJ, PLY and GLB as objects of a session
 - `frames`: poses of engines and robots to the finger's frame, forces back
 - `Atlas`: which point of the finger each pixel is; pressure maps from vertices or contact points
 """
+
+from importlib import import_module
+from types import ModuleType
 
 from . import frames
 from .aio import AsyncSession
@@ -29,7 +34,7 @@ from .errors import (
     Unreachable,
 )
 from .http import DEFAULT_URL, Indentation, indentation, post, sed
-from .render import render, render_chunks
+from .rendering import render, render_chunks
 from .series import Series
 from .spikes import Spikes, SpikeTrains
 from .sync import Session
@@ -68,3 +73,10 @@ __all__ = [
     "render_chunks",
     "sed",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    # Loaded when they are first named: a program that touches needs neither.
+    if name in ("meshes", "sensors"):
+        return import_module(f".{name}", __name__)
+    raise AttributeError(f"module 'papilla' has no attribute {name!r}")

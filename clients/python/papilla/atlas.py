@@ -43,13 +43,13 @@ class Atlas:
         self._owner, self._weights = _cover(uv_px, self.triangles)
         self.pixels: NDArray[np.int64] = np.flatnonzero(self._owner >= 0)
         """Flat indices of the skin's pixels, ascending."""
-        corners = self.triangles[self._owner[self.pixels]]
+        self.owners: NDArray[np.int64] = self._owner[self.pixels]
+        """Triangle of each of `pixels`."""
+        corners = self.triangles[self.owners]
         self._corners = corners
         self.places_mm: NDArray[np.float64] = np.einsum("pi,pix->px", self._weights, self.positions_mm[corners])
         """Where each of `pixels` is on the undeformed finger."""
-        self.areas_mm2: NDArray[np.float64] = _areas_mm2(self.positions_mm, uv_px, self.triangles)[
-            self._owner[self.pixels]
-        ]
+        self.areas_mm2: NDArray[np.float64] = _areas_mm2(self.positions_mm, uv_px, self.triangles)[self.owners]
         """Area of the finger that each of `pixels` shows."""
 
     @classmethod

@@ -115,7 +115,7 @@ def unit_factor(unit: str | None, kind: str) -> float:
     return 1.0 if unit is None else known[unit]
 
 
-def ask_unit(greatest: float, kind: str) -> None:
+def ask_unit(greatest: float, kind: str, whose: str = "") -> None:
     """Raises BadInput where values are so small that another unit was probably meant."""
     if not 0.0 < greatest < _ASKED_BELOW[kind]:
         return
@@ -123,7 +123,7 @@ def ask_unit(greatest: float, kind: str) -> None:
     meant = " or ".join(f"unit={other!r}" for other in others)
     raise BadInput(
         "unit",
-        f"the greatest value is {greatest:.3g}, which is little for {first}: give {meant} if that is meant, "
+        f"the greatest value{whose} is {greatest:.3g}, which is little for {first}: give {meant} if that is meant, "
         f"or unit={first!r} if the values are right",
     )
 

@@ -38,6 +38,8 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "points_j_per_m3": Quantity("J m-3", "strain energy density at the points of the hello"),
     "point_rates_hz": Quantity("s-1", "firing rate of SA1 afferents at the points of the hello"),
     "actuators": Quantity("1", "intensity of each actuator"),
+    "sensor_pressure_pa": Quantity("Pa", "pressure on the skin that reproduces the sensor's readings"),
+    "sensor_reproduction": Quantity("1", "norm of readings minus their reproduction, over that of the readings"),
     "total_us": Quantity("us", "time in the service"),
     "queue_us": Quantity("us", "time in the service spent waiting for a thread"),
     "infer_us": Quantity("us", "time in the network"),

@@ -148,7 +148,7 @@ class _Meter:
     """Counts frames, and tells."""
 
     def __init__(self, progress: Progress, total: int | None) -> None:
-        self._tell = progress if callable(progress) else _line if progress else None
+        self._tell = progress if callable(progress) else line if progress else None
         self._total = total
         self._done = 0
         self._lock = threading.Lock()
@@ -161,7 +161,8 @@ class _Meter:
             self._tell(self._done, self._total)
 
 
-def _line(done: int, total: int | None) -> None:
+def line(done: int, total: int | None) -> None:
+    """Draws how far it is."""
     if total is None or done == total or done % max(1, total // 200) == 0:
         end = "\n" if done == total else ""
         print(f"\r{done} of {total or '?'} frames", end=end, file=sys.stderr, flush=True)

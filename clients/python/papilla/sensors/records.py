@@ -1,0 +1,176 @@
+"""Readings over time, from files."""
+
+from __future__ import annotations
+
+import csv
+import math
+import zipfile
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import check
+from ..errors import BadInput
+
+TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_TIME_NAMES: Final = ("time", "t", "timestamp", "stamp")
+
+
+class Record(NamedTuple):
+    """Readings of a sensor over time."""
+
+    times_s: NDArray[np.float64]
+    """From the first reading on, s."""
+    readings: NDArray[np.float64]
+    """(frames, taxels)."""
+    names: list[str]
+    """Of the taxels."""
+
+
+def read_record(
+    path: str | PathLike[str],
+    *,
+    time: str | None = None,
+    time_unit: str | None = None,
+    rate_hz: float | None = None,
+    columns: Sequence[str] | str | None = None,
+) -> Record:
+    """Reads a record from CSV (a header, then a row for each moment) or NPZ (`times_s` and `readings`).
+
+    `time` names the column of times; without it one is looked for (`time_s`, `t_ms`, `timestamp` and so on).
+    `time_unit` is s, ms, us or ns; without it the end of the name says it. `rate_hz` stands in for times.
+    `columns` lists the taxels in their order, or gives what their names begin with; without it all but time.
+    Raises BadInput with line and column.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise BadInput("record", f"{file} does not exist")
+    if file.suffix == ".npz":
+        return _npz(file, time or "times_s", time_unit, rate_hz)
+    if file.suffix.lower() not in (".csv", ".tsv", ".txt"):
+        raise BadInput("record", f"{file.name} is none of .csv, .tsv, .txt and .npz")
+    names, values = _table(file)
+    at = _time_column(names, time, rate_hz)
+    own = _taxel_columns(names, columns, at)
+    readings = values[:, own]
+    missing = np.argwhere(~np.isfinite(readings).any(axis=1))
+    if len(missing):
+        raise BadInput("record", f"{file.name}, line {int(missing[0, 0]) + 2}: no taxel has a reading")
+    if at is None:
+        times_s = np.arange(len(values)) / _rate(rate_hz)
+    else:
+        times_s = values[:, at] * _time_factor(names[at], time_unit)
+    return Record(_from_zero(times_s), readings, [names[i] for i in own])
+
+
+def _npz(file: Path, time: str, time_unit: str | None, rate_hz: float | None) -> Record:
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            held = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise BadInput("record", f"{file.name} is no readable NPZ ({error})") from error
+    if "readings" not in held:
+        raise BadInput("record", f"{file.name} has {', '.join(held)}; an array 'readings' (frames, taxels) is due")
+    readings = check.numbers(held["readings"], "readings").astype(np.float64)
+    if readings.ndim not in (2, 3) or not len(readings):
+        raise BadInput("readings", f"shape {readings.shape}; (frames, taxels) or (frames, rows, columns) is due")
+    readings = readings.reshape(len(readings), -1)
+    if time in held:
+        times_s = check.numbers(held[time], time).astype(np.float64) * _time_factor(time, time_unit)
+    else:
+        times_s = np.arange(len(readings)) / _rate(rate_hz)
+    return Record(_from_zero(check.times(times_s, len(readings))), readings, [str(i) for i in range(readings.shape[1])])
+
+
+def _table(file: Path) -> tuple[list[str], NDArray[np.float64]]:
+    """Names of columns, and numbers; empty cells and `nan` are NaN."""
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadInput("record", f"{file.name} is no text in UTF-8 ({error})") from error
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if len(lines) < 2:
+        raise BadInput("record", f"{file.name} needs a header and a line for each moment")
+    marks = {mark: lines[0].count(mark) for mark in (",", ";", "\t")}
+    mark = max(marks, key=lambda each: marks[each])
+    rows = list(csv.reader(lines, delimiter=mark))
+    names = [name.strip() for name in rows[0]]
+    if all(_is_number(name) for name in names):
+        raise BadInput("record", f"{file.name} has no header: its first line should name the columns, as time_s,t0,t1")
+    values = np.empty((len(rows) - 1, len(names)))
+    for number, row in enumerate(rows[1:]):
+        if len(row) != len(names):
+            raise BadInput("record", f"{file.name}, line {number + 2}: {len(row)} cells for {len(names)} columns")
+        for column, cell in enumerate(row):
+            cell = cell.strip()
+            if mark == ";":
+                cell = cell.replace(",", ".")
+            if cell and not _is_number(cell):
+                raise BadInput(
+                    "record", f"{file.name}, line {number + 2}, column '{names[column]}': {cell!r} is no number"
+                )
+            values[number, column] = float(cell) if cell else math.nan
+    return names, values
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _time_column(names: list[str], time: str | None, rate_hz: float | None) -> int | None:
+    if time is not None:
+        if time not in names:
+            raise BadInput("time", f"no column '{time}'; there are {', '.join(names[:8])}")
+        return names.index(time)
+    for number, name in enumerate(names):
+        if name.lower().rpartition("_")[0] in _TIME_NAMES or name.lower() in _TIME_NAMES:
+            return number
+    if rate_hz is None:
+        raise BadInput("time", f"no column of times among {', '.join(names[:8])}: name it as time, or give rate_hz")
+    return None
+
+
+def _time_factor(name: str, unit: str | None) -> float:
+    if unit is None:
+        end = name.lower().rpartition("_")[2]
+        unit = end if end in TIME_UNITS else "s"
+    if unit not in TIME_UNITS:
+        raise BadInput("time_unit", f"{unit!r} is none of {', '.join(TIME_UNITS)}")
+    return TIME_UNITS[unit]
+
+
+def _taxel_columns(names: list[str], columns: Sequence[str] | str | None, time: int | None) -> list[int]:
+    if columns is None:
+        own = [number for number in range(len(names)) if number != time]
+    elif isinstance(columns, str):
+        own = [number for number, name in enumerate(names) if name.startswith(columns) and number != time]
+    else:
+        missing = [name for name in columns if name not in names]
+        if missing:
+            raise BadInput("columns", f"no column '{missing[0]}'; there are {', '.join(names[:8])}")
+        own = [names.index(name) for name in columns]
+    if not own:
+        raise BadInput("columns", f"no column of readings among {', '.join(names[:8])}")
+    return own
+
+
+def _rate(rate_hz: float | None) -> float:
+    if rate_hz is None:
+        raise BadInput("rate_hz", "the record has no times: give the rate of its frames")
+    if not (math.isfinite(rate_hz) and rate_hz > 0):
+        raise BadInput("rate_hz", f"{rate_hz}; a rate above 0 is due")
+    return rate_hz
+
+
+def _from_zero(times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    checked = check.times(times_s, len(times_s))
+    shifted: NDArray[np.float64] = checked - checked[0]
+    return shifted

@@ -1,0 +1,166 @@
+"""From a record of a sensor to what the finger felt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from .. import check, rendering
+from ..errors import BadInput
+from ..http import DEFAULT_URL
+from ..series import Series, joined
+from ..wire import Map
+from .expect import Expected, expected
+from .records import Record
+from .taxels import Taxels
+
+_BATCH: Final = 64
+# An array's rim that reads this share of the greatest reading probably lost a part of the contact.
+_RIM: Final = 0.2
+_REPRODUCED: Final = 0.05
+# Standard deviations of the noise beyond which a reading is none of it.
+_CERTAIN: Final = 5.0
+WRITERS: Final = {".nc": "to_netcdf", ".npz": "to_npz", ".csv": "to_csv", ".nwb": "to_nwb"}
+
+
+class Sensed(NamedTuple):
+    """What a finger felt under a sensor."""
+
+    series: Series
+    """With `sensor_reproduction` and, with maps, `sensor_pressure_pa` among its values."""
+    expected: Expected
+    """Errors to expect of such a sensor, against finite elements."""
+    warnings: list[str]
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes NetCDF, NPZ, CSV or NWB by the ending of the path."""
+        getattr(self.series, writer(path))(path)
+
+    def summary(self) -> dict[str, Any]:
+        """The record in a few numbers, for JSON."""
+        values = self.series.values
+        found: dict[str, Any] = {"frames": len(self.series)}
+        if self.series.times_s is not None:
+            found["duration_s"] = float(self.series.times_s[-1])
+        for name, key in (
+            ("summary_force_n", "force_max_n"),
+            ("summary_sed_max_j_per_m3", "sed_max_j_per_m3"),
+            ("summary_sa1_rate_hz", "sa1_rate_max_hz"),
+            ("sensor_reproduction", "reproduction_error_max"),
+        ):
+            if name in values:
+                found[key] = float(values[name].max())
+        if self.series.spikes is not None:
+            found["spikes"] = len(self.series.spikes.unit)
+        found["flagged_frames"] = self.series.flagged()
+        found["tier"] = str(self.series.ready["tier"])
+        found["expected_error"] = self.expected._asdict()
+        found["warnings"] = self.warnings
+        return found
+
+
+def writer(path: str | PathLike[str]) -> str:
+    """The method of `Series` that writes such a file."""
+    ending = Path(path).suffix.lower()
+    if ending not in WRITERS:
+        raise BadInput("out", f"{ending or 'no ending'} is none of {', '.join(WRITERS)}")
+    return WRITERS[ending]
+
+
+def sense(
+    record: Record,
+    sensor: Taxels,
+    *,
+    url: str = DEFAULT_URL,
+    token: str | None = None,
+    tier: str | None = None,
+    effects: Sequence[str] = ("summary", "afferents"),
+    maps: bool = True,
+    progress: rendering.Progress = None,
+    **hello: Any,
+) -> Sensed:
+    """SED, firing rates and, with the effect `spikes`, spikes under a sensor over time.
+
+    `maps=False` keeps numbers alone: a map takes 0.2 MB a frame, and there are up to three.
+    Raises BadInput before anything is sent.
+    """
+    if record.readings.shape[1] != len(sensor):
+        raise BadInput(
+            "record", f"it has {record.readings.shape[1]} taxels, and the sensor '{sensor.name}' {len(sensor)}"
+        )
+    pressure = sensor.pascals(record.readings)
+    greatest = float(np.nanmax(pressure))
+    check.ask_unit(max(greatest, 0.0), "pressure", " of the sensor")
+    names = list(dict.fromkeys(["summary", *effects]))
+    if not maps:
+        hello["map"] = False
+        if "afferents" in names:
+            hello["afferents"] = {"map": False, **hello.get("afferents", {})}
+    if tier is not None:
+        hello["tier"] = tier
+    kept: list[Map] = []
+    errors: list[np.ndarray[Any, np.dtype[np.float64]]] = []
+
+    def fields() -> Iterator[Map]:
+        for start in range(0, len(record.readings), _BATCH):
+            readings = record.readings[start : start + _BATCH]
+            found = sensor.pressure(readings)
+            errors.append(sensor.reproduction(readings, found))
+            if maps:
+                kept.append(found)
+            yield from found
+
+    series = joined(
+        list(
+            rendering.render_chunks(
+                fields(), record.times_s, chunk=_BATCH, unit="Pa", url=url, token=token, effects=names,
+                progress=_of(progress, len(record.readings)), **hello,
+            )
+        )
+    )  # fmt: skip
+    if maps:
+        series.values["sensor_pressure_pa"] = np.concatenate(kept)
+    series.values["sensor_reproduction"] = np.concatenate(errors)
+    share = float(sensor.noise_pa().mean()) / greatest if greatest > 0 else 0.0
+    due = expected(sensor.pitch_mm, share)
+    warnings = [*series.warnings, *_doubts(record, sensor, series, due)]
+    series.warnings = warnings
+    return Sensed(series, due, warnings)
+
+
+def _of(progress: rendering.Progress, total: int) -> rendering.Progress:
+    """The same, told how many frames there are."""
+    if not callable(progress):
+        return (lambda done, _: rendering.line(done, total)) if progress else None
+    tell = progress
+    return lambda done, _: tell(done, total)
+
+
+def _doubts(record: Record, sensor: Taxels, series: Series, due: Expected) -> list[str]:
+    """What a person should know of this record."""
+    doubts = []
+    if sensor.off.any():
+        doubts.append(
+            f"{int(sensor.off.sum())} of {len(sensor)} taxels lie beside the finger; their readings were left out"
+        )
+    pressure, noise = np.nan_to_num(sensor.pascals(record.readings)), float(sensor.noise_pa().max())
+    rim = int(((sensor.edge_share(record.readings) > _RIM) & (pressure.max(axis=1) > _CERTAIN / _RIM * noise)).sum())
+    if rim:
+        doubts.append(f"in {rim} frames the contact reaches the array's edge; what presses beyond it is missing")
+    poor = int((series.values["sensor_reproduction"] > _REPRODUCED).sum())
+    if poor and not sensor.noise:
+        doubts.append(f"in {poor} frames the map misses the readings by more than 5 %: name the sensor's noise")
+    below = int((pressure < -_CERTAIN * noise - 1e-9).any(axis=1).sum())
+    if below:
+        doubts.append(f"in {below} frames a taxel reads below zero, which counts as zero: look at offset and noise")
+    if due.beyond:
+        doubts.append(
+            "the sensor is coarser or noisier than any that was measured: its errors may be greater than stated"
+        )
+    if series.flagged():
+        doubts.append(f"{series.flagged()} frames are flagged; see flags")
+    return doubts

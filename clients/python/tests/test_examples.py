@@ -1,0 +1,54 @@
+"""The gallery: each script runs, finds what it promises, and draws its picture."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+@pytest.fixture
+def example(tmp_path, monkeypatch, url):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.setenv("PAPILLA_URL", url)
+    monkeypatch.setenv("RUNS", "2")
+    monkeypatch.setattr("sys.argv", ["example"])
+
+    def run(name):
+        found = runpy.run_path(str(EXAMPLES / f"{name}.py"))
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+        return found
+
+    return run
+
+
+def test_series(example, tmp_path):
+    found = example("series")
+    assert (tmp_path / "series.csv").is_file() and (tmp_path / "series.nc").is_file()
+    force_n = found["series"].force_n[:, 2]
+    assert force_n.max() > 0.02 and force_n[0] == force_n[-1] == 0.0
+
+
+def test_sensor(example):
+    felt = example("sensor")["felt"]
+    assert felt.series["summary_force_n"].max() == pytest.approx(0.8, rel=0.1)
+    assert felt.series["sensor_reproduction"].max() < 0.6 and len(felt.series.spikes.unit) > 50
+
+
+def test_mesh(example):
+    force_n = example("mesh")["series"].force_n[:, 2]
+    assert (np.diff(force_n) > 0).all() and force_n[-1] > 0.1
+
+
+def test_hold(example):
+    held = example("hold")["held"]
+    last = {tissue: series["summary_sed_max_j_per_m3"][-1] for tissue, series in held.items()}
+    assert last[None] < last["subcutaneous"] < last["skin"]
+
+
+def test_tradeoff(example):
+    found = example("tradeoff")
+    assert {"pico", "small", "large"} <= set(found["names"]) and min(found["times_ms"]) > 0
