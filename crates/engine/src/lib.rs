@@ -160,6 +160,16 @@ fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, EngineError> {
     })
 }
 
+/// The graph as it stands in the file, run by tract operator after operator: what benchmarks compare
+/// a faster evaluation with.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn load_as_it_stands(onnx: &[u8]) -> Result<Arc<dyn Model>, EngineError> {
+    let (proto, info) = checked(onnx, None)?;
+    Ok(Arc::new(tract_backend::TractModel::load(&proto, info)?))
+}
+
 /// A file that has passed the checks of the contract and is its card's, with constants stored in 16
 /// bits widened, and what it says of itself.
 fn checked(onnx: &[u8], card: Option<&Card>) -> Result<(ModelProto, ModelInfo), EngineError> {

@@ -1,151 +1,146 @@
 //! What finite strain adds to the components of a level.
 
+use super::around::{Around, Space};
 use super::gain::Gain;
 use super::parts::CorrectionParts;
-use super::sums::{GROUP, MARGIN, Sums, VECTORS, in_vectors, store};
-use pulp::Simd;
+use super::sums::{GROUP, MARGIN, Sums, VECTORS, in_vectors, vectors_mut};
+use pulp::{Simd, WithSimd};
 
 /// Positions of which hidden values are kept at a time.
 const CHUNK: usize = VECTORS * MARGIN;
 /// Hidden channels of a group of sums: as many values as gates.
-const PAIRS: usize = GROUP / 2;
+pub(super) const PAIRS: usize = GROUP / 2;
 
 /// `out (value * clamp(gate) * gain)`, where value and gate are convolutions of the components and
 /// pressures of a level.
 #[derive(Debug)]
-pub(super) struct Correction {
-    /// Pixels across the convolutions.
-    pub kernel: usize,
-    /// Positions of a part of the map: of a row if the kernel is one pixel, else of all.
-    positions: usize,
-    hidden: usize,
+pub(super) enum Correction {
+    /// Over a block alone.
+    Alone(Alone),
+    /// Over 3 x 3 blocks.
+    Around(Around),
+}
+
+/// Where a correction is worked on.
+#[derive(Debug)]
+pub(super) enum CorrectionSpace {
+    Alone(Vec<f32>),
+    Around(Space),
+}
+
+impl Correction {
+    /// Of a kernel of one block or, as the graph is searched for, three.
+    pub(super) fn new(parts: &CorrectionParts, side: usize) -> Self {
+        match parts.kernel {
+            1 => Self::Alone(Alone::new(parts, side)),
+            _ => Self::Around(Around::new(parts, side)),
+        }
+    }
+
+    pub(super) fn space(&self) -> CorrectionSpace {
+        match self {
+            Self::Alone(alone) => CorrectionSpace::Alone(alone.space()),
+            Self::Around(around) => CorrectionSpace::Around(around.space()),
+        }
+    }
+}
+
+/// Hidden channels, and zeros for a whole group.
+pub(super) fn padded(hidden: usize) -> usize {
+    hidden.next_multiple_of(GROUP)
+}
+
+/// The weight of value or gate in sums whose groups are two values, two gates and so on: of a
+/// channel of these sums and an input's tap.
+pub(super) fn gated(parts: &CorrectionParts, channel: usize, tap: usize) -> f32 {
+    let (of, pair) = (channel / GROUP * PAIRS + channel % PAIRS, channel % GROUP / PAIRS);
+    let weights = if pair == 0 { &parts.value } else { &parts.gate };
+    let taps = parts.inputs * parts.kernel * parts.kernel;
+    if of < parts.hidden { weights[of * taps + tap] } else { 0.0 }
+}
+
+/// A value times its gate.
+#[inline(always)]
+pub(super) fn product<S: Simd>(simd: S, value: S::f32s, gate: S::f32s) -> S::f32s {
+    let (least, most) = (simd.splat_f32s(-1.0), simd.splat_f32s(1.0));
+    simd.mul_f32s(value, simd.max_f32s(least, simd.min_f32s(most, gate)))
+}
+
+/// A correction by the block's own components and pressures.
+#[derive(Debug)]
+pub(super) struct Alone {
+    side: usize,
     /// Two values, two gates, two values and so on.
     gated: Sums,
     gain: Gain,
     out: Sums,
 }
 
-/// How a map lies with zeros around, so that a convolution may go over it as one row.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Flat {
-    side: usize,
-    around: usize,
-}
-
-impl Flat {
-    pub(super) fn new(side: usize, kernel: usize) -> Self {
-        Self { side, around: kernel / 2 }
+impl Alone {
+    fn new(parts: &CorrectionParts, side: usize) -> Self {
+        let CorrectionParts { hidden, inputs, out, over_finger, place, .. } = parts;
+        let (hidden, wide) = (*hidden, side + MARGIN);
+        let taps: Vec<_> = (0..*inputs).map(|input| input * wide).collect();
+        let gated = Sums::new(&taps, 2 * padded(hidden), |channel, tap| gated(parts, channel, tap));
+        let taps: Vec<_> = (0..hidden).map(|channel| channel * CHUNK).collect();
+        let out = Sums::new(&taps, out.len() / hidden, |channel, tap| out[channel * hidden + tap]);
+        Self { side, gated, gain: Gain::of_rows(over_finger, place, side), out }
     }
 
-    fn stride(self) -> usize {
-        self.side + 2 * self.around
-    }
-
-    /// Values between the channels that are read.
-    pub(super) fn channel_len(self) -> usize {
-        self.stride() * self.stride() + 2 * self.around + MARGIN
-    }
-
-    /// Values between the channels that are added.
-    pub(super) fn added_len(self) -> usize {
-        self.side * self.stride() + MARGIN
-    }
-
-    /// Where a row of a channel that is read begins.
-    pub(super) fn row(self, channel: usize, row: usize) -> usize {
-        channel * self.channel_len() + (row + self.around) * self.stride() + self.around
-    }
-
-    /// Where a row of a channel that is added begins.
-    pub(super) fn added_row(self, channel: usize, row: usize) -> usize {
-        channel * self.added_len() + row * self.stride()
+    fn space(&self) -> Vec<f32> {
+        vec![0.0; self.gated.groups() * PAIRS * CHUNK]
     }
 }
 
-impl Correction {
-    pub(super) fn new(parts: &CorrectionParts, side: usize) -> Self {
-        let CorrectionParts { hidden, inputs, kernel, value, gate, out, over_finger, place } =
-            parts;
-        let (hidden, inputs, kernel) = (*hidden, *inputs, *kernel);
-        let flat = Flat::new(side, kernel);
-        let (channel_len, stride) = if kernel == 1 {
-            (side + MARGIN, side + MARGIN)
-        } else {
-            (flat.channel_len(), flat.stride())
-        };
-        let area = kernel * kernel;
-        let taps = (0..inputs * area)
-            .map(|tap| tap / area * channel_len + tap % area / kernel * stride + tap % kernel)
-            .collect();
-        let gated = Sums::new(taps, hidden.div_ceil(PAIRS) * GROUP, |channel, tap| {
-            let (of, pair) = (channel / GROUP * PAIRS + channel % PAIRS, channel % GROUP / PAIRS);
-            let weights = if pair == 0 { value } else { gate };
-            if of < hidden { weights[of * inputs * area + tap] } else { 0.0 }
-        });
-        let gain = if kernel == 1 {
-            Gain::of_rows(over_finger, place, side)
-        } else {
-            Gain::of_map(over_finger, place, side, stride)
-        };
-        let taps = (0..hidden).map(|channel| channel * CHUNK).collect();
-        let out = Sums::new(taps, out.len() / hidden, |channel, tap| out[channel * hidden + tap]);
-        let positions = if kernel == 1 { side } else { side * stride };
-        Self { kernel, positions, hidden, gated, gain, out }
-    }
+/// Adds the correction to a row of components, behind which the pressures lie.
+pub(super) struct AddAlone<'a> {
+    pub alone: &'a Alone,
+    pub row: usize,
+    pub values: &'a mut [f32],
+    pub space: &'a mut [f32],
+}
 
-    /// Values that [`Self::add`] works in.
-    pub(super) fn space(&self) -> Vec<f32> {
-        vec![0.0; self.hidden.next_multiple_of(PAIRS) * CHUNK]
-    }
+impl WithSimd for AddAlone<'_> {
+    type Output = ();
 
-    /// Writes what is added at all positions of a part of the map. `inputs`: components and
-    /// pressures; `added`: the channels lie `added_len` values apart.
     #[inline(always)]
-    pub(super) fn add<S: Simd>(
-        &self,
-        simd: S,
-        part: usize,
-        inputs: &[f32],
-        space: &mut [f32],
-        (added, added_len): (&mut [f32], usize),
-    ) {
-        in_vectors!(S, 0, self.positions, at, V => {
-            for group in 0..self.gated.groups() {
-                self.hide::<S, V>(simd, group, part, at, inputs, space);
-            }
-            for group in 0..self.out.groups() {
-                let sums = self.out.of_group::<S, V>(simd, group, space);
-                for (channel, sums) in sums.iter().enumerate() {
-                    store::<S>(sums, &mut added[(group * GROUP + channel) * added_len + at..]);
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        in_vectors!(S, 0, self.alone.side, at, V => self.at::<S, V>(simd, at));
+    }
+}
+
+impl AddAlone<'_> {
+    #[inline(always)]
+    fn at<S: Simd, const V: usize>(&mut self, simd: S, at: usize) {
+        let Self { alone, row, values, space } = self;
+        let wide = alone.side + MARGIN;
+        for group in 0..alone.gated.groups() {
+            let sums = alone.gated.of_group::<S, V>(simd, group, &values[at..]);
+            for pair in 0..PAIRS {
+                let hidden = vectors_mut::<S>(&mut space[(group * PAIRS + pair) * CHUNK..], V);
+                for v in 0..V {
+                    hidden[v] = product(simd, sums[pair][v], sums[PAIRS + pair][v]);
                 }
             }
-        });
-    }
-
-    #[inline(always)]
-    fn hide<S: Simd, const V: usize>(
-        &self,
-        simd: S,
-        group: usize,
-        part: usize,
-        at: usize,
-        inputs: &[f32],
-        space: &mut [f32],
-    ) {
-        let sums = self.gated.of_group::<S, V>(simd, group, &inputs[at..]);
-        let (values, gates) = sums.split_at(PAIRS);
-        let (least, most) = (simd.splat_f32s(-1.0), simd.splat_f32s(1.0));
-        for (pair, (values, gates)) in values.iter().zip(gates).enumerate() {
-            let channel = group * PAIRS + pair;
-            if channel == self.hidden {
-                break;
+        }
+        for group in 0..alone.gain.groups() {
+            let gains = alone.gain.of_group::<S, V>(simd, group, *row, at);
+            for channel in 0..GROUP {
+                let hidden = vectors_mut::<S>(&mut space[(group * GROUP + channel) * CHUNK..], V);
+                for v in 0..V {
+                    hidden[v] = simd.mul_f32s(hidden[v], gains[channel][v]);
+                }
             }
-            let mut hidden = self.gain.at::<S, V>(simd, channel, part, at);
-            for ((hidden, value), gate) in hidden.iter_mut().zip(values).zip(gates) {
-                let gate = simd.max_f32s(least, simd.min_f32s(most, *gate));
-                *hidden = simd.mul_f32s(*hidden, simd.mul_f32s(*value, gate));
+        }
+        for group in 0..alone.out.groups() {
+            let sums = alone.out.of_group::<S, V>(simd, group, space);
+            for channel in 0..GROUP {
+                let place = (group * GROUP + channel) * wide + at;
+                let values = vectors_mut::<S>(&mut values[place..], V);
+                for v in 0..V {
+                    values[v] = simd.add_f32s(values[v], sums[channel][v]);
+                }
             }
-            store::<S>(&hidden, &mut space[channel * CHUNK..]);
         }
     }
 }

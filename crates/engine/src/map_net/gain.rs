@@ -1,77 +1,62 @@
 //! Factors about 1 that vary smoothly over the finger.
 
-use super::sums::{MARGIN, settled};
+use super::sums::{GROUP, MARGIN, Sums};
 use pulp::Simd;
 
 /// `1 + sum over k of w[c, k] place[k]`, of each channel at each position.
 #[derive(Debug)]
 pub(super) struct Gain {
-    /// `[channels, K]`.
-    weights: Vec<f32>,
-    /// `[parts, K, positions + MARGIN]`: a part is a row, or the whole map.
+    sums: Sums,
+    /// `[parts, K, positions]`.
     place: Vec<f32>,
-    places: usize,
-    positions: usize,
+    part_len: usize,
 }
 
 impl Gain {
     /// `place` is `[K, n, n]`, `weights` `[channels, K]`; each row is a part.
     pub(super) fn of_rows(weights: &[f32], place: &[f32], side: usize) -> Self {
-        let places = place.len() / (side * side);
-        let wide = side + MARGIN;
-        let mut rows = vec![0.0; side * places * wide];
-        for row in 0..side {
-            for k in 0..places {
-                rows[(row * places + k) * wide..][..side]
-                    .copy_from_slice(&place[(k * side + row) * side..][..side]);
-            }
-        }
-        Self {
-            weights: weights.iter().copied().map(settled).collect(),
-            place: rows,
-            places,
-            positions: side,
-        }
+        let at = |row, column| (row, column);
+        Self::of_parts(weights, place, side, (side, side + MARGIN), at)
     }
 
-    /// As [`Self::of_rows`], but the map is one part, its rows `stride` positions apart.
-    pub(super) fn of_map(weights: &[f32], place: &[f32], side: usize, stride: usize) -> Self {
+    /// As [`Self::of_rows`], where so many parts have so many positions each. `at`: the part and
+    /// the position of a row and a column.
+    pub(super) fn of_parts(
+        weights: &[f32],
+        place: &[f32],
+        side: usize,
+        (parts, positions): (usize, usize),
+        at: impl Fn(usize, usize) -> (usize, usize),
+    ) -> Self {
         let places = place.len() / (side * side);
-        let positions = side * stride;
-        let mut map = vec![0.0; places * (positions + MARGIN)];
+        let part_len = places * positions;
+        let mut laid_out = vec![0.0; parts * part_len];
         for (k, place) in place.chunks_exact(side * side).enumerate() {
-            for (row, place) in place.chunks_exact(side).enumerate() {
-                map[k * (positions + MARGIN) + row * stride..][..side].copy_from_slice(place);
+            for (index, value) in place.iter().enumerate() {
+                let (part, position) = at(index / side, index % side);
+                laid_out[part * part_len + k * positions + position] = *value;
             }
         }
-        Self {
-            weights: weights.iter().copied().map(settled).collect(),
-            place: map,
-            places,
-            positions,
-        }
+        let taps: Vec<_> = (0..places).map(|k| k * positions).collect();
+        let sums =
+            Sums::new(&taps, weights.len() / places, |channel, k| weights[channel * places + k]);
+        Self { sums, place: laid_out, part_len }
     }
 
-    /// The factors of a channel at V vectors of positions.
+    pub(super) fn groups(&self) -> usize {
+        self.sums.groups()
+    }
+
+    /// The factors of a group of channels at V vectors of positions; 1 beyond the last channel.
     #[inline(always)]
-    pub(super) fn at<S: Simd, const V: usize>(
+    pub(super) fn of_group<S: Simd, const V: usize>(
         &self,
         simd: S,
-        channel: usize,
+        group: usize,
         part: usize,
         at: usize,
-    ) -> [S::f32s; V] {
-        let wide = self.positions + MARGIN;
-        let place = &self.place[part * self.places * wide..][..self.places * wide];
-        let weights = &self.weights[channel * self.places..][..self.places];
-        let mut gain = [simd.splat_f32s(1.0); V];
-        for (place, weight) in place.chunks_exact(wide).zip(weights) {
-            let (place, _) = S::as_simd_f32s(&place[at..at + V * S::F32_LANES]);
-            let weight = simd.splat_f32s(*weight);
-            for (gain, place) in gain.iter_mut().zip(place) {
-                *gain = simd.mul_add_e_f32s(weight, *place, *gain);
-            }
-        }
-        gain
+    ) -> [[S::f32s; V]; GROUP] {
+        let place = &self.place[part * self.part_len..(part + 1) * self.part_len];
+        self.sums.and::<S, V>(simd, 1.0, group, &place[at..])
     }
 }

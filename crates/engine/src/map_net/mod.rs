@@ -13,10 +13,12 @@
 //! it. Every file is compared on loading with tract's own answers to several maps. A graph that is
 //! not recognised, or is answered otherwise, stays tract's.
 
+mod around;
 mod correction;
 mod gain;
 mod graph;
 mod level;
+mod near;
 mod net;
 mod parts;
 mod pattern;

@@ -1,13 +1,13 @@
 //! A network on maps, laid out for the evaluation, and where one thread works.
 
 use super::correction::Correction;
-use super::gain::Gain;
 use super::level::{Level, LevelSpace};
+use super::near::Near;
 use super::parts::{LevelParts, Parts};
 use super::pixels::{Pixels, Target};
 use super::pressures::{Layout, Pressures};
 use super::reach::Reach;
-use super::sums::{GROUP, MARGIN, Sums};
+use super::sums::{GROUP, MARGIN};
 use super::upsampling::{Above, Upsampling, mix};
 use pulp::{Arch, Simd, WithSimd};
 
@@ -35,22 +35,13 @@ impl Net {
 }
 
 fn level(parts: &LevelParts, components: usize) -> Level {
-    let LevelParts { side, kernel, near, mix: matrix, over_finger, place, correction } = parts;
+    let LevelParts { side, kernel, mix: matrix, correction, .. } = parts;
     let (side, kernel) = (*side, *kernel);
     let layout = Layout { side, around: kernel / 2 };
-    let area = kernel * kernel;
-    let taps = (0..GROUP * area)
-        .map(|tap| {
-            let (plane, row, column) = (tap / area, tap % area / kernel, tap % kernel);
-            plane * layout.plane_len() + row * layout.stride() + column
-        })
-        .collect();
-    let near =
-        Sums::new(taps, GROUP * components, |channel, tap| near[channel * GROUP * area + tap]);
     Level {
         layout,
-        near,
-        gain: Gain::of_rows(over_finger, place, side),
+        components,
+        near: Near::new(parts, layout),
         mix: mix(components, side, |to, from| matrix[to * components + from]),
         correction: correction.as_ref().map(|parts| Correction::new(parts, side)),
     }
@@ -77,7 +68,7 @@ impl Workspace {
         Self {
             pressures: Pressures::new(net.unit, net.pixel, &layouts),
             above: layouts.iter().map(|layout| Above::new(net.components, layout.side)).collect(),
-            levels: net.levels.iter().map(|level| LevelSpace::new(level, net.components)).collect(),
+            levels: net.levels.iter().map(LevelSpace::new).collect(),
             reach: net.reach.space(),
             densities: vec![0.0; GROUP * (side + MARGIN)],
             coarse: (net.pixel == 2).then(|| (Above::new(1, side), Upsampling::new(1, side))),

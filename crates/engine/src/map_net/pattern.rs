@@ -175,7 +175,7 @@ impl<'a> Reader<'_, 'a> {
             && attribute(node, "axis")?.i == 1
             && inputs == channels + BLOCK
             && hidden > 0
-            && kernel <= KERNEL_MAX
+            && [1, 3].contains(&kernel)
             && out_shape == [channels, hidden, 1, 1];
         let (over_finger, place) = self.gain(gain, hidden, side).filter(|_| is_due)?;
         Some(CorrectionParts { hidden, inputs, kernel, value, gate, out, over_finger, place })

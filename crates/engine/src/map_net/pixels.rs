@@ -8,7 +8,7 @@ use std::ops::Range;
 
 /// Rows and columns of blocks of the map.
 const SIDE: usize = MAP_SIDE_PX / 2;
-/// Blocks that a range of columns begins at a multiple of.
+/// Blocks that are made pixels at a time. A range of columns begins at a multiple of MARGIN.
 const STEP: usize = 8;
 
 /// The end of the network: which densities are answered, in which unit.
@@ -42,7 +42,7 @@ impl Pixels {
             };
             let first = (0..SIDE).find(|&column| some(column)).unwrap_or(0);
             let end = (0..SIDE).rfind(|&column| some(column)).map_or(0, |column| column + 1);
-            first / STEP * STEP..end.next_multiple_of(STEP).min(SIDE)
+            first / MARGIN * MARGIN..end.next_multiple_of(STEP).min(SIDE)
         });
         let columns = columns.collect();
         Self { mask, columns }

@@ -1,6 +1,6 @@
 //! The global map of low rank, from the coarsest blocks to their components.
 
-use super::sums::{in_vectors, settled, store, vectors};
+use super::sums::{settled, store, vectors};
 use super::upsampling::Above;
 use pulp::Simd;
 
@@ -55,17 +55,11 @@ impl Reach {
         }
         for (chunk, components) in components.chunks_exact_mut(CHUNK).enumerate() {
             let weights = &self.outward[chunk * self.rank * CHUNK..][..self.rank * CHUNK];
-            in_vectors!(S, 0, CHUNK, at, V => {
-                let mut sums = [simd.splat_f32s(0.0); V];
-                for (k, inner) in inner.iter().enumerate() {
-                    let weights = vectors::<S>(&weights[k * CHUNK + at..], V);
-                    let inner = simd.splat_f32s(*inner);
-                    for (sum, weight) in sums.iter_mut().zip(weights) {
-                        *sum = simd.mul_add_e_f32s(inner, *weight, *sum);
-                    }
-                }
-                store::<S>(&sums, &mut components[at..]);
-            });
+            match CHUNK / S::F32_LANES {
+                2 => outward::<S, 2>(simd, inner, weights, components),
+                4 => outward::<S, 4>(simd, inner, weights, components),
+                _ => outward::<S, 8>(simd, inner, weights, components),
+            }
         }
         let side = self.side;
         for (channel, components) in
@@ -76,5 +70,26 @@ impl Reach {
                     .copy_from_slice(components);
             }
         }
+    }
+}
+
+/// A chunk of components, from vectors as wide as it.
+#[inline(always)]
+fn outward<S: Simd, const V: usize>(
+    simd: S,
+    inner: &[f32],
+    weights: &[f32],
+    components: &mut [f32],
+) {
+    for first in (0..CHUNK).step_by(V * S::F32_LANES) {
+        let mut sums = [simd.splat_f32s(0.0); V];
+        for k in 0..inner.len() {
+            let weights = vectors::<S>(&weights[k * CHUNK + first..], V);
+            let inner = simd.splat_f32s(inner[k]);
+            for v in 0..V {
+                sums[v] = simd.mul_add_e_f32s(inner, weights[v], sums[v]);
+            }
+        }
+        store::<S>(&sums, &mut components[first..]);
     }
 }

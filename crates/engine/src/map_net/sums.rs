@@ -1,6 +1,7 @@
 //! Sums over taps, for many neighbouring positions at a time: convolutions and products.
 
 use pulp::Simd;
+use std::ops::Range;
 
 /// Channels whose sums are in registers at a time. With three vectors of positions each that is
 /// twelve sums, three vectors and a weight: the sixteen registers of AVX2.
@@ -21,30 +22,41 @@ pub(super) fn settled(weight: f32) -> f32 {
 /// `y[o] = sum over t of w[o, t] x[t]`, where `x[t]` lies `taps[t]` values behind the position.
 #[derive(Debug)]
 pub(super) struct Sums {
+    /// Of each group of channels, its taps and weights.
+    groups: Vec<Range<usize>>,
     taps: Vec<usize>,
-    /// `w[o / 4, t, o % 4]`, 0 beyond the last channel.
+    /// 0 beyond the last channel.
     weights: Vec<[f32; GROUP]>,
 }
 
 impl Sums {
-    /// `weight`: of a channel and a tap.
+    /// `weight`: of a channel and a tap. Taps that have no weight in any channel of a group are
+    /// left out of it.
     pub(super) fn new(
-        taps: Vec<usize>,
+        taps: &[usize],
         channels: usize,
         weight: impl Fn(usize, usize) -> f32,
     ) -> Self {
-        let mut weights = vec![[0.0; GROUP]; channels.div_ceil(GROUP) * taps.len()];
-        for channel in 0..channels {
-            let group = &mut weights[channel / GROUP * taps.len()..][..taps.len()];
-            for (tap, weights) in group.iter_mut().enumerate() {
-                weights[channel % GROUP] = settled(weight(channel, tap));
+        let mut sums = Self { groups: vec![], taps: vec![], weights: vec![] };
+        for first in (0..channels).step_by(GROUP) {
+            let begin = sums.taps.len();
+            for (tap, at) in taps.iter().enumerate() {
+                let mut weights = [0.0; GROUP];
+                for (channel, settled_weight) in (first..channels).zip(&mut weights) {
+                    *settled_weight = settled(weight(channel, tap));
+                }
+                if weights.iter().any(|weight| *weight != 0.0) {
+                    sums.taps.push(*at);
+                    sums.weights.push(weights);
+                }
             }
+            sums.groups.push(begin..sums.taps.len());
         }
-        Self { taps, weights }
+        sums
     }
 
     pub(super) fn groups(&self) -> usize {
-        self.weights.len() / self.taps.len()
+        self.groups.len()
     }
 
     /// The sums of a group of channels at V vectors of positions; `map` begins at the first.
@@ -55,14 +67,29 @@ impl Sums {
         group: usize,
         map: &[f32],
     ) -> [[S::f32s; V]; GROUP] {
-        let weights = &self.weights[group * self.taps.len()..][..self.taps.len()];
-        let mut sums = [[simd.splat_f32s(0.0); V]; GROUP];
-        for (tap, weights) in self.taps.iter().zip(weights) {
-            let (values, _) = S::as_simd_f32s(&map[*tap..*tap + V * S::F32_LANES]);
-            for (sums, weight) in sums.iter_mut().zip(weights) {
-                let weight = simd.splat_f32s(*weight);
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    *sum = simd.mul_add_e_f32s(weight, *value, *sum);
+        self.and(simd, 0.0, group, map)
+    }
+
+    /// As [`Self::of_group`], a number added.
+    // By numbers and not by iterators: as many of these as there are here the compiler leaves
+    // uninlined, and a call costs as much as a tap.
+    #[inline(always)]
+    pub(super) fn and<S: Simd, const V: usize>(
+        &self,
+        simd: S,
+        number: f32,
+        group: usize,
+        map: &[f32],
+    ) -> [[S::f32s; V]; GROUP] {
+        let Range { start, end } = self.groups[group];
+        let (taps, weights) = (&self.taps[start..end], &self.weights[start..end]);
+        let mut sums = [[simd.splat_f32s(number); V]; GROUP];
+        for tap in 0..taps.len() {
+            let values = vectors::<S>(&map[taps[tap]..], V);
+            for channel in 0..GROUP {
+                let weight = simd.splat_f32s(weights[tap][channel]);
+                for v in 0..V {
+                    sums[channel][v] = simd.mul_add_e_f32s(weight, values[v], sums[channel][v]);
                 }
             }
         }

@@ -42,8 +42,8 @@ impl Above {
 
 /// The matrix of a mix.
 pub(super) fn mix(channels: usize, side: usize, weight: impl Fn(usize, usize) -> f32) -> Sums {
-    let taps = (0..channels).map(|channel| channel * Above::plane_len(side)).collect();
-    Sums::new(taps, channels, weight)
+    let taps: Vec<_> = (0..channels).map(|channel| channel * Above::plane_len(side)).collect();
+    Sums::new(&taps, channels, weight)
 }
 
 /// Three rows at work.
@@ -53,7 +53,7 @@ pub(super) struct Upsampling {
     channels: usize,
     /// A row of each channel, with zeros before and behind: `[C, MARGIN + n + MARGIN]`.
     mixed: Vec<f32>,
-    /// Interpolated along the row: `[3, C, 2, n + MARGIN]`.
+    /// Interpolated along the row: `[3, n / lanes, C, 2]` vectors, to the left and to the right.
     halves: Vec<f32>,
 }
 
@@ -64,12 +64,12 @@ impl Upsampling {
             side,
             channels,
             mixed: vec![0.0; padded * (side + 2 * MARGIN)],
-            halves: vec![0.0; ROWS * channels * 2 * (side + MARGIN)],
+            halves: vec![0.0; ROWS * channels * 2 * side.next_multiple_of(MARGIN)],
         }
     }
 
     fn row_len(&self) -> usize {
-        self.channels * 2 * (self.side + MARGIN)
+        self.channels * 2 * self.side.next_multiple_of(MARGIN)
     }
 
     /// Before the first row.
@@ -117,48 +117,33 @@ impl Upsampling {
                 mixed.copy_from_slice(&from[channel * Above::plane_len(side)..][..side]);
             }
         }
-        let (len, wide) = (self.row_len(), side + MARGIN);
+        let (len, channels) = (self.row_len(), self.channels);
         let count = side.div_ceil(S::F32_LANES);
         let (own, next) = (simd.splat_f32s(OWN), simd.splat_f32s(NEXT));
-        for channel in 0..self.channels {
+        let halves = &mut self.halves[row % ROWS * len..(row % ROWS + 1) * len];
+        let halves = vectors_mut::<S>(halves, len / S::F32_LANES);
+        for channel in 0..channels {
             let mixed = &self.mixed[channel * width + MARGIN - 1..];
             let before = vectors::<S>(mixed, count);
             let its = vectors::<S>(&mixed[1..], count);
             let behind = vectors::<S>(&mixed[2..], count);
-            let halves = &mut self.halves[row % ROWS * len + channel * 2 * wide..][..2 * wide];
-            let (left, right) = halves.split_at_mut(wide);
-            let left = vectors_mut::<S>(left, count);
-            let right = vectors_mut::<S>(right, count);
             for k in 0..count {
                 let own = simd.mul_f32s(own, its[k]);
-                left[k] = simd.mul_add_e_f32s(next, before[k], own);
-                right[k] = simd.mul_add_e_f32s(next, behind[k], own);
+                let halves = &mut halves[2 * (k * channels + channel)..][..2];
+                halves[0] = simd.mul_add_e_f32s(next, before[k], own);
+                halves[1] = simd.mul_add_e_f32s(next, behind[k], own);
             }
         }
     }
 
-    /// The three rows of a channel that [`phases`] reads, from a column on.
+    /// A row's vectors.
     #[inline(always)]
-    fn lines<S: Simd>(
-        &self,
-        channel: usize,
-        row: usize,
-        from: usize,
-        count: usize,
-    ) -> Lines<'_, S::f32s> {
-        let (len, wide) = (self.row_len(), self.side + MARGIN);
-        let place = channel * 2 * wide + from;
-        let line = |row: usize, half: usize| {
-            vectors::<S>(&self.halves[row % ROWS * len + place + half * wide..], count)
-        };
-        Lines {
-            before: [line(row + ROWS - 1, 0), line(row + ROWS - 1, 1)],
-            its: [line(row, 0), line(row, 1)],
-            behind: [line(row + 1, 0), line(row + 1, 1)],
-        }
+    fn line<S: Simd>(&self, row: usize) -> &[S::f32s] {
+        let len = self.row_len();
+        vectors::<S>(&self.halves[row % ROWS * len..], len / S::F32_LANES)
     }
 
-    /// A row of components: `[4 C, n + MARGIN]`.
+    /// A row of components: `[4 C, n + MARGIN]`. Columns begin at a multiple of MARGIN.
     #[inline(always)]
     pub(super) fn write<S: Simd>(
         &self,
@@ -168,18 +153,23 @@ impl Upsampling {
         components: &mut [f32],
     ) {
         let (wide, from) = (self.side + MARGIN, columns.start);
-        let count = columns.len().div_ceil(S::F32_LANES);
+        let (first, count) = (from / S::F32_LANES, columns.len().div_ceil(S::F32_LANES));
+        let before = self.line::<S>(row + ROWS - 1);
+        let its = self.line::<S>(row);
+        let behind = self.line::<S>(row + 1);
         for channel in 0..self.channels {
-            let lines = self.lines::<S>(channel, row, from, count);
             let components = &mut components[GROUP * channel * wide..][..GROUP * wide];
             let [a, b, c, d] = quarters::<S>(components, wide, from, count);
             for k in 0..count {
-                [a[k], b[k], c[k], d[k]] = phases(simd, &lines, k);
+                let at = 2 * ((first + k) * self.channels + channel);
+                let at = at..at + 2;
+                [a[k], b[k], c[k], d[k]] =
+                    phases(simd, &before[at.clone()], &its[at.clone()], &behind[at]);
             }
         }
     }
 
-    /// Sums of the squares of a row of components: `[4, n + MARGIN]`.
+    /// Sums of the squares of a row of components: `[4, n + MARGIN]`. Columns as above.
     #[inline(always)]
     pub(super) fn write_squares<S: Simd>(
         &self,
@@ -189,22 +179,23 @@ impl Upsampling {
         sums: &mut [f32],
     ) {
         let (wide, from) = (self.side + MARGIN, columns.start);
-        let count = columns.len().div_ceil(S::F32_LANES);
+        let (first, count) = (from / S::F32_LANES, columns.len().div_ceil(S::F32_LANES));
         let [a, b, c, d] = quarters::<S>(sums, wide, from, count);
-        for channel in 0..self.channels {
-            let lines = self.lines::<S>(channel, row, from, count);
-            for k in 0..count {
-                let values = phases(simd, &lines, k);
-                let mut sums = [a[k], b[k], c[k], d[k]];
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    *sum = if channel == 0 {
-                        simd.mul_f32s(value, value)
-                    } else {
-                        simd.mul_add_e_f32s(value, value, *sum)
-                    };
+        let before = self.line::<S>(row + ROWS - 1);
+        let its = self.line::<S>(row);
+        let behind = self.line::<S>(row + 1);
+        for k in 0..count {
+            let place = 2 * (first + k) * self.channels;
+            let mut sums = [simd.splat_f32s(0.0); 4];
+            for channel in 0..self.channels {
+                let at = place + 2 * channel;
+                let at = at..at + 2;
+                let values = phases(simd, &before[at.clone()], &its[at.clone()], &behind[at]);
+                for pixel in 0..4 {
+                    sums[pixel] = simd.mul_add_e_f32s(values[pixel], values[pixel], sums[pixel]);
                 }
-                [a[k], b[k], c[k], d[k]] = sums;
             }
+            [a[k], b[k], c[k], d[k]] = sums;
         }
     }
 }
@@ -220,25 +211,29 @@ fn quarters<S: Simd>(
     let (upper, lower) = rows.split_at_mut(2 * wide);
     let (a, b) = upper.split_at_mut(wide);
     let (c, d) = lower.split_at_mut(wide);
-    [a, b, c, d].map(|row| vectors_mut::<S>(&mut row[from..], count))
-}
-
-/// A row and its neighbours, each interpolated to the left and to the right.
-struct Lines<'a, V> {
-    before: [&'a [V]; 2],
-    its: [&'a [V]; 2],
-    behind: [&'a [V]; 2],
-}
-
-/// Values at a vector of blocks: above left, above right, below left, below right.
-#[inline(always)]
-fn phases<S: Simd>(simd: S, lines: &Lines<'_, S::f32s>, k: usize) -> [S::f32s; 4] {
-    let (own, next) = (simd.splat_f32s(OWN), simd.splat_f32s(NEXT));
-    let [left, right] = [simd.mul_f32s(own, lines.its[0][k]), simd.mul_f32s(own, lines.its[1][k])];
     [
-        simd.mul_add_e_f32s(next, lines.before[0][k], left),
-        simd.mul_add_e_f32s(next, lines.before[1][k], right),
-        simd.mul_add_e_f32s(next, lines.behind[0][k], left),
-        simd.mul_add_e_f32s(next, lines.behind[1][k], right),
+        vectors_mut::<S>(&mut a[from..], count),
+        vectors_mut::<S>(&mut b[from..], count),
+        vectors_mut::<S>(&mut c[from..], count),
+        vectors_mut::<S>(&mut d[from..], count),
+    ]
+}
+
+/// Values at a vector of blocks: above left, above right, below left, below right. Of the row and
+/// its neighbours, each interpolated to the left and to the right.
+#[inline(always)]
+fn phases<S: Simd>(
+    simd: S,
+    before: &[S::f32s],
+    its: &[S::f32s],
+    behind: &[S::f32s],
+) -> [S::f32s; 4] {
+    let (own, next) = (simd.splat_f32s(OWN), simd.splat_f32s(NEXT));
+    let (left, right) = (simd.mul_f32s(own, its[0]), simd.mul_f32s(own, its[1]));
+    [
+        simd.mul_add_e_f32s(next, before[0], left),
+        simd.mul_add_e_f32s(next, before[1], right),
+        simd.mul_add_e_f32s(next, behind[0], left),
+        simd.mul_add_e_f32s(next, behind[1], right),
     ]
 }

@@ -8,7 +8,6 @@ use proptest::prelude::*;
 use std::cell::RefCell;
 
 mod naive;
-mod times;
 
 /// What is added where answers are compared: pressures of less than 1e-9 Pa count for nothing.
 const NOTHING: f32 = 1e-20;
