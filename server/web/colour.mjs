@@ -161,7 +161,10 @@ export function percentile(values, pixels, peak, part) {
 /** Root of the mean square over the pixels. */
 export function rms(values, pixels) {
   let sum = 0;
-  for (let n = 0; n < pixels.length; n++) sum += values[pixels[n]] ** 2;
+  for (let n = 0; n < pixels.length; n++) {
+    const value = values[pixels[n]];
+    sum += value * value;
+  }
   return Math.sqrt(sum / Math.max(1, pixels.length));
 }
 

@@ -12,8 +12,9 @@ const SILENT_MS = 10000;
 export function relativeL2(a, b, pixels) {
   let [error, size] = [0, 0];
   for (let n = 0; n < pixels.length; n++) {
-    error += (a[pixels[n]] - b[pixels[n]]) ** 2;
-    size += b[pixels[n]] ** 2;
+    const [x, y] = [a[pixels[n]], b[pixels[n]]];
+    error += (x - y) * (x - y);
+    size += y * y;
   }
   return size > 0 ? Math.sqrt(error / size) : NaN;
 }

@@ -36,16 +36,14 @@ export class MapView {
     /** What the scale has to hold. */
     this.most = 0;
     this.shown = '';
+    /** Whether its scale has to hold what it shows. */
+    this.isShown = true;
     this.probe = -1;
     this.marker = null;
     this.#listen();
     this.#readTheme();
     new ResizeObserver(() => this.#fit()).observe(this.overlay);
     onTheme(() => this.#readTheme());
-  }
-
-  get isShown() {
-    return this.element.checkVisibility();
   }
 
   /** Binds the view to a patch: only its pixels are painted. */

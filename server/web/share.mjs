@@ -31,13 +31,13 @@ const python = (value) => JSON.stringify(value).replace(/\btrue\b/g, 'True').rep
   .replace(/":/g, '": ').replace(/,(?=["[{\d-])/g, ', ');
 
 /** The press as a program with the Python client. */
-export function pythonOf({ origin, terms, pose, token }) {
+export function pythonOf({ origin, terms, pose }) {
   const names = Object.entries(terms).filter(([name, value]) => !['atlas_hash', 'sample_type'].includes(name) && value !== null && !(Array.isArray(value) && value.length === 0));
   const lines = names.map(([name, value]) => `    ${name}=${python(value)},`);
   return `import papilla
 
 with papilla.Session(
-    "${origin}",${token ? '\n    token="...",  # the token of this service' : ''}
+    "${origin}",
 ${lines.join('\n')}
 ) as session:
     answer = session.touch(${JSON.stringify(Array.from(pose, round))})

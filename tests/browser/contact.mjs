@@ -129,8 +129,8 @@ test('a second model answers the same contact, and the difference is of that pai
   await settled();
   await until(() => globalThis.papilla.pair.apart > 0 && / % apart/.test(document.getElementById('apart').textContent));
   const { first, second, difference, apart, pixels } = await page.evaluate(() => {
-    const { comparison, pair, atlas } = globalThis.papilla;
-    return { first: Array.from(comparison.first), second: Array.from(pair.second), difference: Array.from(pair.difference), apart: pair.apart, pixels: Array.from(atlas.interface.raster.pixels) };
+    const { pair, atlas } = globalThis.papilla;
+    return { first: Array.from(pair.first), second: Array.from(pair.second), difference: Array.from(pair.difference), apart: pair.apart, pixels: Array.from(atlas.interface.raster.pixels) };
   });
   // The press stands still, so that the frame that is on its way is the same contact.
   let [error, size] = [0, 0];
