@@ -5,7 +5,6 @@
 
 mod answer;
 pub(crate) mod app;
-mod bucket;
 mod first_use;
 pub(crate) mod front;
 pub(crate) mod gate;

@@ -1,16 +1,18 @@
 //! How many requests a second one client may send: a token bucket each.
 
 use std::{
-    collections::HashMap,
     net::{IpAddr, Ipv6Addr},
     num::NonZeroU32,
-    sync::{Arc, Mutex, PoisonError},
-    time::Instant,
+    sync::Arc,
 };
 
+use governor::{
+    Quota, RateLimiter,
+    clock::{Clock, MonotonicClock},
+    middleware::NoOpMiddleware,
+    state::keyed::HashMapStateStore,
+};
 use papilla_proto::{ErrorCode, Problem};
-
-use crate::transport::bucket::{Bucket, Rate};
 
 /// Beyond so many buckets the full ones are thrown away: their clients have been silent.
 const BUCKETS_MAX: usize = 4096;
@@ -39,18 +41,24 @@ pub(crate) fn network_of(address: IpAddr) -> IpAddr {
 }
 
 /// All buckets.
-pub(super) struct Rates {
-    per_s: u32,
-    rate: Rate,
-    buckets: Mutex<HashMap<Key, Bucket>>,
+pub(super) struct Rates<C: Clock = MonotonicClock> {
+    per_s: NonZeroU32,
+    buckets: RateLimiter<Key, HashMapStateStore<Key>, C, NoOpMiddleware<C::Instant>>,
+    clock: C,
 }
 
 impl Rates {
     /// None if any rate is allowed.
     pub(super) fn new(per_s: u32, burst: Option<NonZeroU32>) -> Option<Self> {
-        let per_s = NonZeroU32::new(per_s)?;
-        let rate = Rate::new(per_s.get(), burst.unwrap_or(per_s).get());
-        Some(Self { per_s: per_s.get(), rate, buckets: Mutex::default() })
+        Some(Self::with_clock(NonZeroU32::new(per_s)?, burst, MonotonicClock))
+    }
+}
+
+impl<C: Clock + Clone> Rates<C> {
+    fn with_clock(per_s: NonZeroU32, burst: Option<NonZeroU32>, clock: C) -> Self {
+        let quota = Quota::per_second(per_s).allow_burst(burst.unwrap_or(per_s));
+        let buckets = RateLimiter::new(quota, HashMapStateStore::default(), clock.clone());
+        Self { per_s, buckets, clock }
     }
 
     /// Takes one request's worth from the client's bucket.
@@ -58,23 +66,16 @@ impl Rates {
     /// # Errors
     /// It holds less.
     pub(super) fn check(&self, key: &Key) -> Result<(), Problem> {
-        self.check_at(key, Instant::now())
-    }
-
-    fn check_at(&self, key: &Key, now: Instant) -> Result<(), Problem> {
-        let mut buckets = self.buckets.lock().unwrap_or_else(PoisonError::into_inner);
-        if buckets.len() >= BUCKETS_MAX {
-            buckets.retain(|_, bucket| !bucket.is_full(now));
+        if self.buckets.len() >= BUCKETS_MAX {
+            self.buckets.retain_recent();
         }
-        let mut bucket = buckets.get(key).copied().unwrap_or_else(|| Bucket::full(now));
-        bucket.take(self.rate, now).map_err(|wait| {
+        self.buckets.check_key(key).map_err(|refused| {
+            let wait = refused.wait_time_from(self.clock.now());
             let (per_s, wait_ms) = (self.per_s, wait.as_millis() + 1);
             let message =
                 format!("more than {per_s} requests a second; the next is taken in {wait_ms} ms");
             Problem::new(ErrorCode::RateLimited, message)
-        })?;
-        buckets.insert(key.clone(), bucket);
-        Ok(())
+        })
     }
 }
 
@@ -82,38 +83,48 @@ impl Rates {
 mod tests {
     use std::time::Duration;
 
+    use governor::clock::FakeRelativeClock;
+
     use super::*;
 
     fn key(text: &str) -> Key {
         Key::of_address(text.parse().unwrap())
     }
 
+    fn rates(per_s: u32, burst: u32) -> (Rates<FakeRelativeClock>, FakeRelativeClock) {
+        let clock = FakeRelativeClock::default();
+        let per_s = NonZeroU32::new(per_s).unwrap();
+        (Rates::with_clock(per_s, NonZeroU32::new(burst), clock.clone()), clock)
+    }
+
     #[test]
     fn a_client_has_its_burst_and_then_its_rate() {
-        let rates = Rates::new(10, NonZeroU32::new(20)).unwrap();
-        let (a, b, start) = (key("10.0.0.1"), key("10.0.0.2"), Instant::now());
-        let taken = |key: &Key, ms: u64, tries: usize| {
-            let now = start + Duration::from_millis(ms);
-            (0..tries).filter(|_| rates.check_at(key, now).is_ok()).count()
-        };
-        assert_eq!(taken(&a, 0, 100), 20);
-        assert_eq!(taken(&b, 0, 5), 5, "one client takes nothing from another");
-        assert_eq!(taken(&a, 99, 100), 0);
-        assert_eq!(taken(&a, 500, 100), 5);
-        assert_eq!(taken(&a, 60_000, 100), 20, "a bucket holds no more than its burst");
-        assert_eq!(rates.check_at(&a, start).unwrap_err().code, ErrorCode::RateLimited);
+        let (rates, clock) = rates(10, 20);
+        let (a, b) = (key("10.0.0.1"), key("10.0.0.2"));
+        let taken =
+            |key: &Key, tries: usize| (0..tries).filter(|_| rates.check(key).is_ok()).count();
+        assert_eq!(taken(&a, 100), 20);
+        assert_eq!(taken(&b, 5), 5, "one client takes nothing from another");
+        clock.advance(Duration::from_millis(99));
+        assert_eq!(taken(&a, 100), 0);
+        let refused = rates.check(&a).unwrap_err();
+        assert_eq!(refused.code, ErrorCode::RateLimited);
+        assert!(refused.to_string().contains("in 2 ms"), "{refused}");
+        clock.advance(Duration::from_millis(401));
+        assert_eq!(taken(&a, 100), 5);
+        clock.advance(Duration::from_secs(60));
+        assert_eq!(taken(&a, 100), 20, "a bucket holds no more than its burst");
         assert!(Rates::new(0, None).is_none());
     }
 
     #[test]
     fn silent_clients_are_forgotten() {
-        let rates = Rates::new(100, NonZeroU32::new(1)).unwrap();
-        let start = Instant::now();
+        let (rates, clock) = rates(100, 1);
         for n in 0..3 * BUCKETS_MAX as u32 {
-            let now = start + Duration::from_millis(n.into());
-            rates.check_at(&Key::of_address(IpAddr::from(n.to_be_bytes())), now).unwrap();
+            clock.advance(Duration::from_millis(1));
+            rates.check(&Key::of_address(IpAddr::from(n.to_be_bytes()))).unwrap();
         }
-        let left = rates.buckets.lock().unwrap().len();
+        let left = rates.buckets.len();
         assert!(left <= BUCKETS_MAX, "{left}");
     }
 

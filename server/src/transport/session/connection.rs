@@ -206,20 +206,20 @@ impl Connection {
             }
             Message::Binary(bytes) => Some(Event::Binary(bytes, received)),
             Message::Ping(payload) => {
-                self.count_control(received)?;
+                self.count_control()?;
                 self.reply.out.send(&wire::frame(opcode::PONG, &payload));
                 None
             }
             Message::Pong => {
-                self.count_control(received)?;
+                self.count_control()?;
                 None
             }
             Message::Close(code) => return Err(End::Client(code)),
         })
     }
 
-    fn count_control(&mut self, now: Instant) -> Result<(), End> {
-        self.limits.on_control(now).map_err(|problem| End::Refused(problem, close::POLICY))
+    fn count_control(&self) -> Result<(), End> {
+        self.limits.on_control().map_err(|problem| End::Refused(problem, close::POLICY))
     }
 
     /// Counts a read; the end of the session if the connection has ended.

@@ -1,10 +1,17 @@
 //! How much of one client's input is handled at a time, so that other sessions do not wait for it.
 
-use std::time::{Duration, Instant};
+use std::{
+    num::NonZeroU32,
+    time::{Duration, Instant},
+};
 
+use governor::{
+    Quota, RateLimiter,
+    clock::{Clock, MonotonicClock},
+    middleware::NoOpMiddleware,
+    state::{InMemoryState, NotKeyed},
+};
 use papilla_proto::{ErrorCode, Problem};
-
-use crate::transport::bucket::{Bucket, Rate};
 
 /// Length of a turn. What a session may do in it takes a fraction of it, and a client that sends
 /// without a pause waits for the next one with its bytes in its own buffers.
@@ -21,32 +28,47 @@ const BYTES_MAX: usize = 512 << 10;
 const READS_MAX: u32 = 128;
 
 /// Pings, pongs and closes a second that a session may send, and how many at once.
-const CONTROL_PER_S: u32 = 200;
-const CONTROL_BURST: u32 = 400;
+const CONTROL_PER_S: NonZeroU32 = NonZeroU32::new(200).unwrap();
+const CONTROL_BURST: NonZeroU32 = NonZeroU32::new(400).unwrap();
 
 /// Text messages a second that a session may send (hellos: each may place points and take memory),
 /// and how many at once.
-const TEXT_PER_S: u32 = 4;
-const TEXT_BURST: u32 = 8;
+const TEXT_PER_S: NonZeroU32 = NonZeroU32::new(4).unwrap();
+const TEXT_BURST: NonZeroU32 = NonZeroU32::new(8).unwrap();
+
+type Bucket<C> = RateLimiter<NotKeyed, InMemoryState, C, NoOpMiddleware<<C as Clock>::Instant>>;
 
 /// What a session has done in this turn, and what it may still do.
 #[derive(Debug)]
-pub(super) struct Limits {
+pub(super) struct Limits<C: Clock = MonotonicClock> {
     begun: Instant,
     frames: u32,
     reads: u32,
     bytes: usize,
-    control: Bucket,
-    text: Bucket,
+    control: Bucket<C>,
+    text: Bucket<C>,
+    clock: C,
     /// Nothing is read before.
     paused_until: Option<Instant>,
 }
 
 impl Limits {
     pub(super) fn new(now: Instant) -> Self {
-        let full = Bucket::full(now);
-        let (control, text) = (full, full);
-        Self { begun: now, frames: 0, reads: 0, bytes: 0, control, text, paused_until: None }
+        Self::with_clock(now, MonotonicClock)
+    }
+}
+
+impl<C: Clock + Clone> Limits<C> {
+    fn with_clock(now: Instant, clock: C) -> Self {
+        let bucket = |per_s, burst| {
+            RateLimiter::direct_with_clock(
+                Quota::per_second(per_s).allow_burst(burst),
+                clock.clone(),
+            )
+        };
+        let control = bucket(CONTROL_PER_S, CONTROL_BURST);
+        let text = bucket(TEXT_PER_S, TEXT_BURST);
+        Self { begun: now, frames: 0, reads: 0, bytes: 0, control, text, clock, paused_until: None }
     }
 
     /// When the session may go on; none: at once.
@@ -81,9 +103,8 @@ impl Limits {
     ///
     /// # Errors
     /// More than a session may send.
-    pub(super) fn on_control(&mut self, now: Instant) -> Result<(), Problem> {
-        let rate = Rate::new(CONTROL_PER_S, CONTROL_BURST);
-        self.control.take(rate, now).map_err(|_| {
+    pub(super) fn on_control(&self) -> Result<(), Problem> {
+        self.control.check().map_err(|_| {
             let message = format!("more than {CONTROL_PER_S} control frames a second");
             Problem::new(ErrorCode::RateLimited, message)
         })
@@ -91,14 +112,16 @@ impl Limits {
 
     /// A text message; beyond the rate, the session pauses after it.
     pub(super) fn on_text(&mut self, now: Instant) {
-        if let Err(wait) = self.text.take(Rate::new(TEXT_PER_S, TEXT_BURST), now) {
-            self.paused_until = Some(now + wait);
+        if let Err(refused) = self.text.check() {
+            self.paused_until = Some(now + refused.wait_time_from(self.clock.now()));
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use governor::clock::FakeRelativeClock;
+
     use super::*;
 
     #[test]
@@ -143,14 +166,14 @@ mod tests {
     #[test]
     fn control_frames_beyond_their_rate_are_refused_and_texts_pause_the_session() {
         let start = Instant::now();
-        let mut limits = Limits::new(start);
-        let taken = (0..1000).take_while(|_| limits.on_control(start).is_ok()).count();
-        assert_eq!(taken, CONTROL_BURST as usize);
-        (0..TEXT_BURST).for_each(|_| limits.on_text(start));
+        let mut limits = Limits::with_clock(start, FakeRelativeClock::default());
+        let taken = (0..1000).take_while(|_| limits.on_control().is_ok()).count();
+        assert_eq!(taken, CONTROL_BURST.get() as usize);
+        (0..TEXT_BURST.get()).for_each(|_| limits.on_text(start));
         assert_eq!(limits.resume_at(start), None);
         limits.on_text(start);
         let resume = limits.resume_at(start).unwrap();
-        assert_eq!(resume - start, Duration::from_secs(1) / TEXT_PER_S);
+        assert_eq!(resume - start, Duration::from_secs(1) / TEXT_PER_S.get());
         assert_eq!(limits.resume_at(resume), None);
     }
 }
