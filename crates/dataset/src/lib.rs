@@ -20,6 +20,7 @@
 // Determinism is tested: the same bits, not nearly the same.
 #![cfg_attr(test, allow(clippy::float_cmp))]
 
+mod arrays;
 mod error;
 mod images;
 mod lattice;
@@ -37,6 +38,7 @@ mod table;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
+pub use arrays::{ArraysReport, arrays};
 pub use error::DatasetError;
 pub use images::{ImageEntry, ImageOptions, ImagesReport, images};
 pub use lattice::TriangleOnLattice;

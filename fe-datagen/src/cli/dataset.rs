@@ -50,6 +50,17 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Maps of all states as NumPy arrays.
+    Maps {
+        /// The dataset's folder.
+        folder: PathBuf,
+        /// Folder to make for the arrays.
+        #[arg(long)]
+        out: PathBuf,
+        /// Print the report as JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Held-out samples with their FE truth, for the service's page.
     Replay {
         /// The dataset's folder.
@@ -114,6 +125,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let report = dataset::images(folder, out, &ImageOptions { bits })?;
             print(&report, *json, || {
                 format!("{} pairs written to {}", report.samples.len(), report.folder.display())
+            })?;
+        }
+        Command::Maps { folder, out, json } => {
+            let report = dataset::arrays(folder, out)?;
+            print(&report, *json, || {
+                format!("maps of {} states written to {}", report.states, report.folder.display())
             })?;
         }
         Command::Replay { folder, out, count, json } => {
