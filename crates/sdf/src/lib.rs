@@ -36,6 +36,7 @@ mod sphere;
 mod testing;
 mod touch;
 mod union;
+pub mod vector;
 mod wedge;
 
 pub use announced::{AnnouncedError, AnnouncedPart, AnnouncedShape, AnnouncedUnion, HeightGrid};

@@ -5,6 +5,7 @@
 //! ```
 
 use super::{Distance, SignedDistance};
+use crate::vector::{along, norm};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
@@ -37,16 +38,8 @@ pub(super) fn draw() -> impl Strategy<Value = Draw> {
     (prop::array::uniform3(0.0..1.0f64), 0u8..4, -0.6..2.0f64)
 }
 
-fn along(p: [f64; 3], step: f64, v: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| p[i] + step * v[i])
-}
-
 fn axis(i: usize, sign: f64) -> [f64; 3] {
     std::array::from_fn(|k| if k == i { sign } else { 0.0 })
-}
-
-fn norm(v: [f64; 3]) -> f64 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
 fn largest(h: &[[f64; 3]; 3]) -> f64 {

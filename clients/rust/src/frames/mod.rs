@@ -15,6 +15,7 @@
 //! ```
 
 use papilla_proto::contact::{Pose, Touch};
+use papilla_sdf::vector::{cross, dot, minus};
 
 type Three = [f64; 3];
 /// x y z w.
@@ -220,18 +221,6 @@ impl Convention {
 
 fn checked_scale(scale: f64) -> Result<f64, PlaceError> {
     if scale > 0.0 && scale.is_finite() { Ok(scale) } else { Err(PlaceError::Scale(scale)) }
-}
-
-fn minus(a: Three, b: Three) -> Three {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn dot(a: Three, b: Three) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn cross(a: Three, b: Three) -> Three {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn inverse([x, y, z, w]: Quaternion) -> Quaternion {

@@ -14,6 +14,7 @@
 //! triangles, leaving two unknowns per interior vertex) is exact.
 
 use super::FlattenError;
+use super::angles::dot;
 use super::disc::Disc;
 use super::sparse::{Cholesky, Entry};
 use serde::Serialize;
@@ -314,8 +315,4 @@ impl Reduced {
         let mean = dot(self.inverse, v) / self.inverse_sum;
         std::array::from_fn(|k| self.inverse[k] * (v[k] - mean))
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -26,7 +26,7 @@ pub(super) fn corner_angles(
 
 fn angle(at: [f64; 3], to: [f64; 3], other: [f64; 3]) -> f64 {
     let (a, b) = (difference(to, at), difference(other, at));
-    norm(cross(a, b)).atan2(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+    norm(cross(a, b)).atan2(dot(a, b))
 }
 
 /// Area of a triangle in space.
@@ -48,10 +48,14 @@ pub(super) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 pub(super) fn norm(a: [f64; 3]) -> f64 {
-    (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt()
+    dot(a, a).sqrt()
 }

@@ -1,6 +1,7 @@
 //! Nodal values of a surface read anywhere on it, with the shape functions of its faces.
 
 use super::{Mesh, Surface};
+use papilla_sdf::vector::dot;
 use papilla_solid::tensor::norm;
 
 /// For each of some points the face of a surface that is nearest, and the shape functions there.
@@ -119,7 +120,6 @@ fn project(
         let miss: [f64; 3] = std::array::from_fn(|i| p[i] - sum(&|a| value[a], i));
         let t: [[f64; 3]; 2] = [0, 1].map(|k| std::array::from_fn(|i| sum(&|a| gradient[a][k], i)));
         distance = norm(miss);
-        let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
         let (aa, ab, bb) = (dot(t[0], t[0]), dot(t[0], t[1]), dot(t[1], t[1]));
         let (ar, br) = (dot(t[0], miss), dot(t[1], miss));
         let determinant = aa * bb - ab * ab;

@@ -8,6 +8,7 @@
 use super::body::{Body, SimulationError};
 use papilla_fem::mesh::Surface;
 use papilla_fem::solve::Solver;
+use papilla_sdf::vector::dot;
 use papilla_solid::tensor::norm;
 use std::collections::BTreeMap;
 
@@ -60,10 +61,6 @@ impl Body {
         }
         Ok(())
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|i| a[i] * b[i]).sum()
 }
 
 fn unit(v: [f64; 3]) -> [f64; 3] {

@@ -9,6 +9,7 @@
 //! their tangent planes.
 
 use super::{Distance, Placed, Placement, SignedDistance};
+use crate::vector::{along, cross, dot, minus, norm};
 
 /// Bodies closer than this are one: there is no way in between, mm.
 pub(crate) const SEAM_MM: f64 = 1e-3;
@@ -471,26 +472,6 @@ fn multipliers(active: [&Plane; 3], count: usize) -> Option<[f64; 3]> {
 /// Signed distance of a body's nearest surface, covered or not.
 fn side<B: Body>(body: &B, at: [f64; 3]) -> f64 {
     body.placement().side_mm(body.shape(), at)
-}
-
-fn along(p: [f64; 3], step: f64, v: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| p[i] + step * v[i])
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn norm(v: [f64; 3]) -> f64 {
-    dot(v, v).sqrt()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The point of a triangle that is nearest to another one.
 
-use super::{dot, minus};
+use crate::vector::{dot, minus};
 
 /// What of a triangle is nearest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,6 +16,7 @@ pub use error::MeshError;
 
 use super::beneath::SEAM_MM;
 use super::{Distance, SignedDistance};
+use crate::vector::{cross, dot, minus};
 use check::Checked;
 use closest::{Feature, closest};
 use serde::{Deserialize, Serialize};
@@ -184,20 +185,8 @@ impl SignedDistance for MeshDistance {
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 fn square(a: [f64; 3]) -> f64 {
     dot(a, a)
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn add(sum: &mut [f64; 3], v: [f64; 3]) {

@@ -4,8 +4,9 @@
 use super::error::MeshError;
 use super::tree::Tree;
 use super::work::Work;
-use super::{dot, minus, normal, scaled_to_one};
+use super::{normal, scaled_to_one};
 use crate::beneath::SEAM_MM;
+use crate::vector::{cross, dot, minus};
 
 /// Least cosine between normals of faces that lie upon each other.
 const PARALLEL: f64 = 1.0 - 1e-9;
@@ -51,7 +52,7 @@ pub(super) fn lying_upon(
 fn overlap(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3], n: [f64; 3]) -> bool {
     let separates = |of: &[[f64; 3]; 3]| {
         (0..3).any(|k| {
-            let axis = scaled_to_one(super::cross(minus(of[(k + 1) % 3], of[k]), n));
+            let axis = scaled_to_one(cross(minus(of[(k + 1) % 3], of[k]), n));
             let ends = |t: &[[f64; 3]; 3]| {
                 let at = t.map(|p| dot(minus(p, of[k]), axis));
                 (at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2]))
@@ -80,7 +81,7 @@ pub(super) fn covered(
     }
     let mut volume = vec![0.0; count];
     for (place, of) in places.iter().zip(&shell) {
-        volume[*of] += dot(place[0], super::cross(place[1], place[2]));
+        volume[*of] += dot(place[0], cross(place[1], place[2]));
     }
     let far = places.iter().flatten().map(|p| p[0]).fold(f64::NEG_INFINITY, f64::max);
     let (mut asked, mut wrong) = (vec![0; count], vec![0; count]);

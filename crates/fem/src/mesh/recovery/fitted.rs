@@ -11,6 +11,7 @@ use super::{NoElement, Sample, SedRecovery, element_on_side, sorted};
 use crate::element::ElementKind;
 use crate::element::reference::GAUSS_2;
 use crate::mesh::{Mesh, Region};
+use papilla_sdf::vector::dot;
 use std::collections::{BTreeSet, HashMap};
 
 /// Intervals at which a point's weight has fallen to 1/e.
@@ -114,7 +115,6 @@ fn intervals(mesh: &Mesh, face: &[u32], node: u32) -> [[f64; 3]; 2] {
 
 /// Coordinates of `r` along two axes that span its plane, least squares.
 fn coordinates([a, b]: [[f64; 3]; 2], r: [f64; 3]) -> [f64; 2] {
-    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
     let (aa, ab, bb, ar, br) = (dot(a, a), dot(a, b), dot(b, b), dot(a, r), dot(b, r));
     let determinant = aa * bb - ab * ab;
     [(ar * bb - br * ab) / determinant, (br * aa - ar * ab) / determinant]
