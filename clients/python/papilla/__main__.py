@@ -96,7 +96,7 @@ def _sense(options: argparse.Namespace) -> None:
     print(f"{found['frames']} frames over {found['duration_s']:.3g} s, model {found['tier']}")
     print(f"force at most {found['force_max_n']:.3g} N, SED at most {found['sed_max_j_per_m3']:.0f} J/m3")
     print(f"all SA1 afferents at most {found['sa1_rate_max_hz']:.0f} spikes a second")
-    print(f"the maps miss the readings by {100 * found['reproduction_error_max']:.1f} % at most")
+    print(f"where it presses, the maps miss the readings by {100 * found['reproduction_error_max']:.1f} % at most")
     due = sensed.expected
     print(
         f"expected error against finite elements (median): SED {100 * due.sed_relative_l2:.0f} %, "

@@ -42,7 +42,6 @@ class Field:
         self._pixels = np.concatenate(footprints)
         self._first = np.concatenate([[0], np.cumsum([len(pixels) for pixels in footprints])[:-1]])
         areas = atlas.areas_mm2[self._pixels]
-        self._areas: NDArray[np.float64] = np.add.reduceat(areas, self._first)
         self._weights = areas / np.repeat(np.add.reduceat(areas, self._first), [len(p) for p in footprints])
         self._centres = np.add.reduceat(atlas.places_mm[self._pixels] * self._weights[:, None], self._first)
         self._atlas, self._pitch_mm, self._count = atlas, pitch_mm, len(atlas.pixels)
@@ -82,10 +81,9 @@ class Field:
     def _fit(self, found: Reals, rows: NDArray[np.int64], wanted: Reals, close: float) -> None:
         if self._operator is None:
             self._operator = self._smoothest()
-        free = self._free(wanted)
         limit = np.maximum(NEAR * close, _CLOSE * wanted.max(axis=1))
         given = wanted.copy()
-        field = np.where(free, np.maximum(given @ self._operator, 0.0), 0.0)
+        field = np.maximum(given @ self._operator, 0.0)
         left = wanted - self.means(field).astype(np.float32)
         off = np.sqrt((left**2).mean(axis=1))
         step = np.ones(len(rows), np.float32)
@@ -94,7 +92,7 @@ class Field:
             if not len(open_):
                 break
             tried = given[open_] + step[open_, None] * left[open_]
-            new = np.where(free[open_], np.maximum(tried @ self._operator, 0.0), 0.0)
+            new = np.maximum(tried @ self._operator, 0.0)
             new_left = wanted[open_] - self.means(new).astype(np.float32)
             new_off = np.sqrt((new_left**2).mean(axis=1))
             better = new_off < off[open_]
@@ -106,18 +104,7 @@ class Field:
                 new_off[better],
             )
             step[open_[~better]] *= 0.5
-        # What is left, taken evenly: the force of the readings.
-        force = self.means(field.astype(np.float64)) @ self._areas
-        field *= np.clip((wanted @ self._areas) / np.maximum(force, 1e-30), 0.5, 2.0).astype(np.float32)[:, None]
         found[rows] = field
-
-    def _free(self, wanted: Reals) -> NDArray[np.bool_]:
-        """Pixels that may be pressed: all but those under taxels that felt nothing."""
-        free = np.ones((len(wanted), self._count), bool)
-        for taxel, pixels in enumerate(self._footprints):
-            silent = np.flatnonzero(wanted[:, taxel] == 0.0)
-            free[np.ix_(silent, pixels)] = False
-        return free
 
     def _smoothest(self) -> Reals:
         """(taxels, pixels): the smoothest field, negative where it likes, whose means are one taxel's unit reading."""

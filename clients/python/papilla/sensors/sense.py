@@ -22,6 +22,7 @@ _BATCH: Final = 64
 # An array's rim that reads this share of the greatest reading probably lost a part of the contact.
 _RIM: Final = 0.2
 _REPRODUCED: Final = 0.05
+_PRESSED: Final = 0.1
 # Standard deviations of the noise beyond which a reading is none of it.
 _CERTAIN: Final = 5.0
 WRITERS: Final = {".nc": "to_netcdf", ".npz": "to_npz", ".csv": "to_csv", ".nwb": "to_nwb"}
@@ -50,10 +51,13 @@ class Sensed(NamedTuple):
             ("summary_force_n", "force_max_n"),
             ("summary_sed_max_j_per_m3", "sed_max_j_per_m3"),
             ("summary_sa1_rate_hz", "sa1_rate_max_hz"),
-            ("sensor_reproduction", "reproduction_error_max"),
         ):
             if name in values:
                 found[key] = float(values[name].max())
+        # Where hardly anything presses, the noise is all that there is to reproduce.
+        force_n = values["summary_force_n"]
+        pressed = force_n > _PRESSED * force_n.max()
+        found["reproduction_error_max"] = float(values["sensor_reproduction"][pressed].max()) if pressed.any() else 0.0
         if self.series.spikes is not None:
             found["spikes"] = len(self.series.spikes.unit)
         found["flagged_frames"] = self.series.flagged()
