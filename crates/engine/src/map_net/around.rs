@@ -9,8 +9,8 @@
 //! Tiles are next to each other in the vectors. So a map lies as planes, one for each place within
 //! a tile, and the transforms need no shuffling.
 
-use super::correction::{PAIRS, gated, padded, product};
 use super::gain::Gain;
+use super::gated::{PAIRS, gated, padded, product};
 use super::parts::CorrectionParts;
 use super::sums::{GROUP, MARGIN, Sums, VECTORS, in_vectors, settled, vectors, vectors_mut};
 use pulp::{Simd, WithSimd};

@@ -16,6 +16,7 @@
 mod around;
 mod correction;
 mod gain;
+mod gated;
 mod graph;
 mod level;
 mod near;

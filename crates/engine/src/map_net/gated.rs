@@ -1,0 +1,29 @@
+//! Values and their gates: one convolution gives both, and their product is a hidden channel.
+
+use super::parts::CorrectionParts;
+use super::sums::GROUP;
+use pulp::Simd;
+
+/// Hidden channels of a group of sums: as many values as gates.
+pub(super) const PAIRS: usize = GROUP / 2;
+
+/// Hidden channels, and zeros for a whole group.
+pub(super) fn padded(hidden: usize) -> usize {
+    hidden.next_multiple_of(GROUP)
+}
+
+/// The weight of value or gate in sums whose groups are two values, two gates and so on: of a
+/// channel of these sums and an input's tap.
+pub(super) fn gated(parts: &CorrectionParts, channel: usize, tap: usize) -> f32 {
+    let (of, pair) = (channel / GROUP * PAIRS + channel % PAIRS, channel % GROUP / PAIRS);
+    let weights = if pair == 0 { &parts.value } else { &parts.gate };
+    let taps = parts.inputs * parts.kernel * parts.kernel;
+    if of < parts.hidden { weights[of * taps + tap] } else { 0.0 }
+}
+
+/// A value times its gate.
+#[inline(always)]
+pub(super) fn product<S: Simd>(simd: S, value: S::f32s, gate: S::f32s) -> S::f32s {
+    let (least, most) = (simd.splat_f32s(-1.0), simd.splat_f32s(1.0));
+    simd.mul_f32s(value, simd.max_f32s(least, simd.min_f32s(most, gate)))
+}
