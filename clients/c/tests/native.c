@@ -28,7 +28,9 @@ static int failures = 0;
     if (!(what)) ++failures, printf("%s:%d: %s\n", __FILE__, __LINE__, #what); \
   } while (0)
 
+/* What this thread has asked for, and how often any thread has asked the system for pages. */
 static _Thread_local long allocations = 0;
+static _Atomic long pages = 0;
 #ifdef COUNTS
 extern void *__libc_malloc(size_t), *__libc_calloc(size_t, size_t), *__libc_realloc(void *, size_t);
 extern void *__libc_memalign(size_t, size_t);
@@ -42,6 +44,7 @@ int posix_memalign(void **block, size_t align, size_t size) {
   return *block ? 0 : ENOMEM;
 }
 void *mmap(void *at, size_t size, int protection, int flags, int file, off_t from) {
+  ++pages;
   return ++allocations, (void *)syscall(SYS_mmap, at, size, protection, flags, file, from);
 }
 void *mmap64(void *at, size_t size, int protection, int flags, int file, off64_t from) {
@@ -54,6 +57,7 @@ void *mremap(void *old, size_t old_size, size_t size, int flags, ...) {
   va_start(more, flags);
   void *const to = flags & MREMAP_FIXED ? va_arg(more, void *) : NULL;
   va_end(more);
+  ++pages;
   return ++allocations, (void *)syscall(SYS_mremap, old, old_size, size, flags, to);
 }
 #endif
@@ -205,11 +209,12 @@ static void costs(const PapillaModel *model) {
   CHECK(threads() == 1);
 }
 
-/* What is freed serves what comes next: the library's heap stops growing. No sanitizer looks into it. */
+/* What is freed serves what comes next: the library's heap stops growing. No sanitizer looks into it.
+ * Models are read on a thread of their own, so pages are counted for all threads. */
 static void nothing_leaks(const PapillaModel *model) {
   long warm = 0;
   for (int cycle = 0; cycle < 150; ++cycle) {
-    if (cycle == 50) warm = allocations;
+    if (cycle == 50) warm = pages;
     PapillaModel *const other = cycle % 25 == 0 ? papilla_model_new() : NULL;
     CHECK(other == NULL || papilla_model_load(other, folder, "nano", contact) == PAPILLA_OK);
     PapillaSession *const session = papilla_session_new();
@@ -220,7 +225,7 @@ static void nothing_leaks(const PapillaModel *model) {
     papilla_session_free(session);
     papilla_model_free(other);
   }
-  CHECK(allocations == warm);
+  CHECK(pages == warm);
 }
 
 static void *at_once(void *model) {
@@ -261,7 +266,7 @@ int main(int count, char **arguments) {
   PapillaModel *model = papilla_model_new();
   CHECK(papilla_model_load(model, folder, "nano", contact) == PAPILLA_OK);
 #ifdef COUNTS
-  CHECK(allocations > 0); /* what would see nothing could not fail */
+  CHECK(allocations > 0 && pages > 0); /* what would see nothing could not fail */
 #endif
   costs(model);
   nothing_leaks(model);
