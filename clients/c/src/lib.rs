@@ -27,9 +27,9 @@ mod session;
 mod status;
 
 /// The library's own heap. The network runtime (tract 0.23.9) has no place for results from outside:
-/// each of its operators allocates what it returns, for `nano` 131 blocks a map, 440 kB. From here they
-/// come in constant time (two-level segregated fit: Masmano et al., ECRTS 2004), out of memory that
-/// stays, so that a warm frame asks neither malloc nor the system.
+/// each of its operators allocates what it returns. The published U-Nets and the half-space run in it.
+/// From here these blocks come in constant time (two-level segregated fit: Masmano et al., ECRTS 2004),
+/// out of memory that stays, so that a warm frame asks neither malloc nor the system.
 #[cfg(unix)]
 #[global_allocator]
 static HEAP: rlsf::GlobalTlsf = rlsf::GlobalTlsf::new();

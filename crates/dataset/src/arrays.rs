@@ -1,7 +1,8 @@
 //! All maps of a dataset as NumPy arrays, for whoever reads them without this crate.
 
 use super::{Dataset, DatasetError, Field, Maps, ShardMaps};
-use ndarray_npy::{WriteNpyExt as _, write_zeroed_npy};
+use ndarray::{Array1, ArrayBase, ArrayView2, Data, Dimension};
+use ndarray_npy::{WritableElement, WriteNpyExt as _, write_zeroed_npy};
 use papilla_atlas::{MAP_LEN, MAP_SIDE_PX, Patch};
 use papilla_output::OutputError;
 use serde::Serialize;
@@ -81,15 +82,14 @@ fn draw(
     }
     pressure.finish()?;
     sed.finish()?;
-    let masks = Patch::ALL.map(|patch| (patch.name(), mask(&maps, patch)));
-    for (name, mask) in masks {
-        let shape = (MAP_SIDE_PX, MAP_SIDE_PX);
-        let mask = ndarray::Array2::from_shape_vec(shape, mask).expect("a mask is a map");
-        save(&into.join(format!("{name}.npy")), &mask)?;
+    for patch in Patch::ALL {
+        let mask = maps.raster(patch).mask();
+        let mask = ArrayView2::from_shape((MAP_SIDE_PX, MAP_SIDE_PX), mask).expect("a map");
+        save(&into.join(format!("{}.npy", patch.name())), &mask)?;
     }
-    save(&into.join("press.npy"), &ndarray::Array1::from(ids))?;
-    save(&into.join("state.npy"), &ndarray::Array1::from(of_press))?;
-    save(&into.join("depth_mm.npy"), &ndarray::Array1::from(depth_mm))?;
+    save(&into.join("press.npy"), &Array1::from(ids))?;
+    save(&into.join("state.npy"), &Array1::from(of_press))?;
+    save(&into.join("depth_mm.npy"), &Array1::from(depth_mm))?;
     let report = ArraysReport {
         dataset_sha256: dataset.manifest().dataset_sha256.clone(),
         atlas_hash: dataset.manifest().atlas_hash.clone(),
@@ -103,16 +103,12 @@ fn draw(
     Ok(report)
 }
 
-fn mask(maps: &Maps, patch: Patch) -> Vec<bool> {
-    let mut mask = vec![false; MAP_LEN];
-    maps.raster(patch).indices().iter().for_each(|&pixel| mask[pixel as usize] = true);
-    mask
-}
-
-fn save<T: ndarray_npy::WritableElement, D: ndarray::Dimension>(
-    path: &Path,
-    array: &ndarray::Array<T, D>,
-) -> Result<(), OutputError> {
+fn save<S, D>(path: &Path, array: &ArrayBase<S, D>) -> Result<(), OutputError>
+where
+    S: Data,
+    S::Elem: WritableElement,
+    D: Dimension,
+{
     let file = File::create(path).map_err(OutputError::io("write", path))?;
     array
         .write_npy(BufWriter::new(file))
@@ -161,7 +157,7 @@ impl MapFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::{Array1, Array2, Array3};
+    use ndarray::{Array2, Array3};
     use ndarray_npy::read_npy;
 
     #[test]

@@ -1,4 +1,4 @@
-"""What a sensor of some pitch and noise costs in accuracy, as measured by tests/sensors/study.py."""
+"""What a sensor of some pitch and noise costs in accuracy, as measured by studies/sensors.py."""
 
 from __future__ import annotations
 

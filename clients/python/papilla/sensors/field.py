@@ -18,7 +18,7 @@ from ..atlas import Atlas
 
 Reals = NDArray[np.float32]
 
-# Chosen on states of the training (tests/sensors/study.py choose).
+# Chosen on states of the training (studies/sensors.py choose).
 WIDTH = 0.6
 """Standard deviation of the kernel over the pitch."""
 RIDGE: Final = 1e-3

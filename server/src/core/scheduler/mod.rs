@@ -6,7 +6,6 @@
 //! checks, infers, encodes, and hands the [`Done`] to the slot's [`Sink`].
 
 mod account;
-mod clock;
 mod exchange;
 mod job;
 mod queue;

@@ -8,7 +8,7 @@ use std::{
 };
 
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
-use papilla_engine::EngineError;
+use papilla_engine::{EngineError, processor_time};
 use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem, flags};
 use papilla_render::{Known, Maps, Read, Rendering, require_finite};
@@ -17,7 +17,6 @@ use papilla_session_contact::{Finger, Frame};
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Slot, Times,
     account::{LONG, Spent},
-    clock,
     exchange::{Inbox, TierSession},
     queue::{Next, Queue},
 };
@@ -79,7 +78,7 @@ impl Worker {
 
     /// Serves a slot; what it cost, and whether another job has come meanwhile.
     fn take_turn(&mut self, slot: &Slot) -> (Spent, bool) {
-        let (begun, cpu_begun) = (Instant::now(), clock::thread_time());
+        let (begun, cpu_begun) = (Instant::now(), processor_time());
         let mut spent = Spent { busy: Duration::ZERO, beside_network: None };
         let abandoned = slot.is_abandoned();
         let Some((mut job, mut recycler)) = slot.take() else { return (spent, false) };
@@ -91,7 +90,7 @@ impl Worker {
         let is_rendered = matches!(done.outcome, Outcome::Map { .. });
         // Of what failed or came too late, a long time tells as much and a short one nothing.
         let beside_network =
-            clock::thread_time().saturating_sub(cpu_begun).saturating_sub(done.times.network);
+            processor_time().saturating_sub(cpu_begun).saturating_sub(done.times.network);
         if is_rendered || beside_network > LONG {
             spent.beside_network = Some(beside_network);
         }
@@ -207,9 +206,9 @@ impl Worker {
             meta.flags |= rendering.flags();
             return Ok(Outcome::Late(Stage::Inference));
         } else {
-            let cpu_begun = clock::thread_time();
+            let cpu_begun = processor_time();
             rendering.infer(session).map_err(of_network("the inference failed"))?;
-            times.network = clock::thread_time().saturating_sub(cpu_begun);
+            times.network = processor_time().saturating_sub(cpu_begun);
             times.infer = decoded.elapsed();
             tier.latency.learn(times.infer);
         }

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """What a sensor's pitch and noise cost in accuracy: virtual arrays read finite-element states.
 
-    python tests/sensors/study.py choose [--url URL]      compares ways from readings to pressure, on training states
-    python tests/sensors/study.py measure [--url URL]     measures the chosen way on test states, and writes
-                                                          studies/reports/sensors.md, its picture, and the table
-                                                          that papilla.sensors.expected and docs/guides/sensors.md have
+    python studies/sensors.py choose [--url URL]   compares ways from readings to pressure, on training states
+    python studies/sensors.py measure [--url URL]  measures the chosen way on test states, and writes
+                                                   studies/reports/sensors.md, its picture, and the table
+                                                   that papilla.sensors.expected and docs/guides/sensors.md have
 
 Needs a running papilla-server, numpy and matplotlib. `measure` takes some ten minutes on two busy cores.
 """
@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "clients/python"), str(ROOT / "model-export/trainer")]
 
 import papilla  # noqa: E402
@@ -33,7 +33,7 @@ REPORT = ROOT / "studies/reports/sensors.md"
 PICTURE = ROOT / "studies/reports/pictures/sensors.png"
 TABLE = ROOT / "clients/python/papilla/sensors/accuracy.json"
 GUIDE = ROOT / "docs/guides/sensors.md"
-BEGIN, END = "<!-- begin: tests/sensors/study.py writes this table -->", "<!-- end -->"
+BEGIN, END = "<!-- begin: studies/sensors.py writes this table -->", "<!-- end -->"
 # Shapes of indenters without edges or detail finer than a contact.
 WIDE = {"plate", "ball of 12 mm", "ball of 6 mm"}
 # The pad as it is seen from below, mm.
@@ -305,7 +305,7 @@ HEAD = """\
 nerve fibres of type 1) if pressure is not known everywhere, but read by an array of taxels? The command
 
 ```sh
-python tests/sensors/study.py measure
+python studies/sensors.py measure
 ```
 
 writes this page beside a running `papilla-server`. Written on {date}, {machine}.
