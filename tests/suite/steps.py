@@ -101,7 +101,12 @@ def fast() -> list[Step]:
             after=("build",),
             tests_min=740,
         ),
-        Step("cycles", "no module imports itself in a circle", "tests/suite/cycles"),
+        Step(
+            "cycles",
+            "no module imports itself in a circle, of Rust or of Python",
+            "python3 tests/suite/imports_test.py\ntests/suite/cycles",
+            tests_min=1,
+        ),
         Step(
             "features",
             "third-party crates are compiled once, whichever program is built",

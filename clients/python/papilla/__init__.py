@@ -14,31 +14,32 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 """
 
 from importlib import import_module
-from types import ModuleType
+from typing import TYPE_CHECKING
 
-from . import frames
-from .aio import AsyncSession
-from .answer import Answer, Problem, Summary, Touch
-from .atlas import Atlas, Contact
-from .errors import (
-    BadAddress,
-    BadFrame,
-    BadInput,
-    Closed,
-    FrameFailed,
-    MissingExtra,
-    NotCarried,
-    NotRendered,
-    PapillaError,
-    Refused,
-    Unreachable,
-)
-from .http import DEFAULT_URL, Indentation, indentation, post, sed
-from .rendering import render, render_chunks
-from .series import Series
-from .spikes import Spikes, SpikeTrains
-from .sync import Session
-from .wire import SIDE_PX
+if TYPE_CHECKING:
+    from . import frames, meshes, sensors
+    from .aio import AsyncSession
+    from .answer import Answer, Problem, Spikes, Summary, Touch
+    from .atlas import Atlas, Contact
+    from .errors import (
+        BadAddress,
+        BadFrame,
+        BadInput,
+        Closed,
+        FrameFailed,
+        MissingExtra,
+        NotCarried,
+        NotRendered,
+        PapillaError,
+        Refused,
+        Unreachable,
+    )
+    from .http import DEFAULT_URL, Indentation, indentation, post, sed
+    from .rendering import render, render_chunks
+    from .series import Series
+    from .spikes import SpikeTrains
+    from .sync import Session
+    from .wire import SIDE_PX
 
 __all__ = [
     "DEFAULT_URL",
@@ -68,15 +69,54 @@ __all__ = [
     "Unreachable",
     "frames",
     "indentation",
+    "meshes",
     "post",
     "render",
     "render_chunks",
     "sed",
+    "sensors",
 ]
 
 
-def __getattr__(name: str) -> ModuleType:
-    # Loaded when they are first named: a program that touches needs neither.
-    if name in ("meshes", "sensors"):
-        return import_module(f".{name}", __name__)
-    raise AttributeError(f"module 'papilla' has no attribute {name!r}")
+# Each module is loaded when one of its names is first used: a program that sends one map over HTTP
+# does not wait for WebSockets, and one that opens a session not for files.
+_NAMES = {
+    "aio": ("AsyncSession",),
+    "answer": ("Answer", "Problem", "Spikes", "Summary", "Touch"),
+    "atlas": ("Atlas", "Contact"),
+    "errors": (
+        "BadAddress",
+        "BadFrame",
+        "BadInput",
+        "Closed",
+        "FrameFailed",
+        "MissingExtra",
+        "NotCarried",
+        "NotRendered",
+        "PapillaError",
+        "Refused",
+        "Unreachable",
+    ),
+    "http": ("DEFAULT_URL", "Indentation", "indentation", "post", "sed"),
+    "rendering": ("render", "render_chunks"),
+    "series": ("Series",),
+    "spikes": ("SpikeTrains",),
+    "sync": ("Session",),
+    "wire": ("SIDE_PX",),
+}
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
+_MODULES = (*_NAMES, "frames", "meshes", "sensors")
+
+if not TYPE_CHECKING:  # type checkers see the imports above, and refuse other names
+
+    def __getattr__(name: str) -> object:
+        if name in _MODULES:
+            return import_module(f".{name}", __name__)
+        if name not in _HOME:
+            raise AttributeError(f"module 'papilla' has no attribute {name!r}")
+        value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__, *_MODULES})

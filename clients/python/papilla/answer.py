@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from . import spikes, wire
+from . import wire
 from .errors import NotCarried, NotRendered
 from .wire import Map, Window
 
@@ -56,6 +57,28 @@ def read_touch(message: bytes, offset: int) -> Touch:
     """The touch at `offset`."""
     v = struct.unpack_from("<16f", message, offset)
     return Touch((v[0], v[1], v[2]), (v[3], v[4], v[5]), v[6], (v[7], v[8], v[9]), *v[10:])
+
+
+class Spikes(NamedTuple):
+    """Who fired since the answer before, in the order of time."""
+
+    unit: NDArray[np.uint16]
+    """Number of the unit in `ready["units"]`."""
+    time_us: NDArray[np.int64]
+    """When, by the client's clock."""
+    total: int
+    """Spikes of the finger since the hello, those too that no answer carried; modulo 2^32."""
+
+
+_SPIKES_HEAD = struct.Struct("<II")
+_SPIKE = np.dtype([("unit", "<u2"), ("before_us", "<u2")])
+
+
+def read_spikes(message: bytes, offset: int, client_time_us: int) -> Spikes:
+    """The spikes at `offset`."""
+    total, count = _SPIKES_HEAD.unpack_from(message, offset)
+    found = np.frombuffer(message, _SPIKE, count, offset + _SPIKES_HEAD.size)
+    return Spikes(found["unit"].copy(), client_time_us - found["before_us"].astype(np.int64), total)
 
 
 class Problem(NamedTuple):
@@ -118,7 +141,7 @@ class Answer:
     point_rates_hz: Map | None = None
     """Firing rates there, Hz: with the effects `points` and `afferents`."""
     actuators: Map | None = None
-    spikes: spikes.Spikes | None = None
+    spikes: Spikes | None = None
     """The effect `spikes`."""
 
     @property
@@ -203,7 +226,7 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         elif name == "actuators":
             answer.actuators = wire.floats(message, offset, size)
         elif name == "spikes":
-            answer.spikes = spikes.read(message, offset, header.client_time_us)
+            answer.spikes = read_spikes(message, offset, header.client_time_us)
         elif name == "map":
             answer.values = wire.samples(message, offset, header)
     return answer

@@ -11,16 +11,36 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import BadInput, MissingExtra
-from .series import Series, quantity
+from .quantities import quantity
+from .spikes import SpikeTrains
 from .wire import FLAGS, SIDE_PX
 
 if TYPE_CHECKING:
     import xarray
+
+
+class Recorded(Protocol):
+    """What is written: a `Series`."""
+
+    times_s: NDArray[np.float64] | None
+    values: dict[str, NDArray[Any]]
+    flags: NDArray[np.uint8]
+    tier: NDArray[Any]
+    ready: dict[str, Any]
+    spikes: SpikeTrains | None
+    warnings: list[str]
+
+    def __len__(self) -> int: ...
+
+    def flag_names(self, frame: int) -> list[str]: ...
+
+    def dimensions(self, name: str) -> tuple[str, ...]: ...
 
 
 @contextmanager
@@ -35,7 +55,7 @@ def whole(path: str | PathLike[str]) -> Iterator[Path]:
         os.replace(there, target)
 
 
-def attributes(series: Series) -> dict[str, Any]:
+def attributes(series: Recorded) -> dict[str, Any]:
     """What was agreed on, as text and numbers."""
     ready = series.ready
     about: dict[str, Any] = {"source": "papilla", "tier": ready["tier"], "atlas_hash": ready["atlas_hash"]}
@@ -50,7 +70,7 @@ def attributes(series: Series) -> dict[str, Any]:
     return about
 
 
-def dataset(series: Series) -> xarray.Dataset:
+def dataset(series: Recorded) -> xarray.Dataset:
     try:
         import xarray
     except ImportError as error:
@@ -83,7 +103,7 @@ def dataset(series: Series) -> xarray.Dataset:
     return xarray.Dataset(variables, coordinates, attributes(series))
 
 
-def netcdf(series: Series, path: str | PathLike[str]) -> None:
+def netcdf(series: Recorded, path: str | PathLike[str]) -> None:
     data = dataset(series)
     try:
         import h5netcdf  # noqa: F401
@@ -94,7 +114,7 @@ def netcdf(series: Series, path: str | PathLike[str]) -> None:
         data.to_netcdf(there, engine="h5netcdf", encoding=packed)
 
 
-def npz(series: Series, path: str | PathLike[str]) -> None:
+def npz(series: Recorded, path: str | PathLike[str]) -> None:
     arrays: dict[str, Any] = dict(series.values)
     if series.times_s is not None:
         arrays["times_s"] = series.times_s
@@ -107,7 +127,7 @@ def npz(series: Series, path: str | PathLike[str]) -> None:
         np.savez_compressed(file, **arrays, flags=np.array(names), tier=series.tier, about=np.array(about))
 
 
-def rows(series: Series) -> tuple[list[str], list[list[Any]]]:
+def rows(series: Recorded) -> tuple[list[str], list[list[Any]]]:
     """Names of columns, and a row for each frame."""
     columns: dict[str, Any] = {}
     columns |= {"frame": np.arange(len(series))} if series.times_s is None else {"time_s": series.times_s}
@@ -129,7 +149,7 @@ def rows(series: Series) -> tuple[list[str], list[list[Any]]]:
     return list(columns), table
 
 
-def csv(series: Series, path: str | PathLike[str]) -> None:
+def csv(series: Recorded, path: str | PathLike[str]) -> None:
     names, table = rows(series)
     with whole(path) as there, there.open("w", newline="", encoding="utf-8") as file:
         writer = csv_files.writer(file)
@@ -137,7 +157,7 @@ def csv(series: Series, path: str | PathLike[str]) -> None:
         writer.writerows(table)
 
 
-def nwb(series: Series, path: str | PathLike[str], start: datetime | None) -> None:
+def nwb(series: Recorded, path: str | PathLike[str], start: datetime | None) -> None:
     if series.times_s is None:
         raise BadInput("times", "an NWB file needs the time of each frame: give times to render")
     try:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import save
 from .answer import Answer, Summary, Touch
 from .errors import NotCarried
 from .spikes import SpikeTrains
@@ -21,43 +22,6 @@ if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[Any]
-
-
-class Quantity(NamedTuple):
-    """Unit of a quantity, and what it is."""
-
-    unit: str
-    about: str
-
-
-QUANTITIES: Final[dict[str, Quantity]] = {
-    "sed_j_per_m3": Quantity("J m-3", "strain energy density at the dermis-epidermis interface"),
-    "rates_hz": Quantity("s-1", "firing rate of SA1 afferents"),
-    "pressure_pa": Quantity("Pa", "pressure on the skin that was found"),
-    "shear_pa": Quantity("Pa", "traction along the skin, in the finger's frame"),
-    "points_j_per_m3": Quantity("J m-3", "strain energy density at the points of the hello"),
-    "point_rates_hz": Quantity("s-1", "firing rate of SA1 afferents at the points of the hello"),
-    "actuators": Quantity("1", "intensity of each actuator"),
-    "sensor_pressure_pa": Quantity("Pa", "pressure on the skin that reproduces the sensor's readings"),
-    "sensor_reproduction": Quantity("1", "norm of readings minus their reproduction, over that of the readings"),
-    "total_us": Quantity("us", "time in the service"),
-    "queue_us": Quantity("us", "time in the service spent waiting for a thread"),
-    "infer_us": Quantity("us", "time in the network"),
-}
-"""Quantities of a series, but for those of `touch_` and `summary_`."""
-_ENDS: Final = {
-    "_n": "N", "_n_mm": "N mm", "_mm2": "mm2", "_mm": "mm", "_n_per_mm": "N mm-1", "_pa": "Pa", "_us": "us",
-    "_px": "pixel", "_px2": "pixel2", "_j_per_m3": "J m-3", "_uj_per_m": "uJ m-1", "_hz": "s-1", "share": "1",
-}  # fmt: skip
-
-
-def quantity(name: str) -> Quantity:
-    """Unit and meaning of a variable."""
-    if name in QUANTITIES:
-        return QUANTITIES[name]
-    end = max((end for end in _ENDS if name.endswith(end)), key=len)
-    source, _, rest = name.partition("_")
-    return Quantity(_ENDS[end], f"{rest} of the section {source} of the answer")
 
 
 class Series:
@@ -147,33 +111,23 @@ class Series:
 
     def to_xarray(self) -> xarray.Dataset:
         """As a Dataset with units, flags and tier; raises MissingExtra without `papilla[xarray]`."""
-        from .save import dataset
-
-        return dataset(self)
+        return save.dataset(self)
 
     def to_netcdf(self, path: str | PathLike[str]) -> None:
         """Writes `to_xarray()` as NetCDF 4; raises MissingExtra without `papilla[xarray]`."""
-        from .save import netcdf
-
-        netcdf(self, path)
+        save.netcdf(self, path)
 
     def to_npz(self, path: str | PathLike[str]) -> None:
         """Writes all arrays as a compressed NPZ of NumPy, which needs nothing more."""
-        from .save import npz
-
-        npz(self, path)
+        save.npz(self, path)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Writes a row for each frame: all numbers, and the greatest value of each map."""
-        from .save import csv
-
-        csv(self, path)
+        save.csv(self, path)
 
     def to_nwb(self, path: str | PathLike[str], start: datetime | None = None) -> None:
         """Writes a Neurodata Without Borders file; needs times; raises MissingExtra without `papilla[nwb]`."""
-        from .save import nwb
-
-        nwb(self, path, start)
+        save.nwb(self, path, start)
 
 
 class Columns:

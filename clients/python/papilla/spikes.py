@@ -1,40 +1,16 @@
-"""Spikes of the effect `spikes`: of one answer, and of a whole session as files."""
+"""Spikes of a whole session, with the effect `spikes`, as arrays and files."""
 
 from __future__ import annotations
 
-import struct
 from datetime import UTC, datetime
 from os import PathLike
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .answer import Answer
 from .errors import MissingExtra, PapillaError
-
-if TYPE_CHECKING:
-    from .answer import Answer
-
-_HEAD = struct.Struct("<II")
-_SPIKE = np.dtype([("unit", "<u2"), ("before_us", "<u2")])
-
-
-class Spikes(NamedTuple):
-    """Who fired since the answer before, in the order of time."""
-
-    unit: NDArray[np.uint16]
-    """Number of the unit in `ready["units"]`."""
-    time_us: NDArray[np.int64]
-    """When, by the client's clock."""
-    total: int
-    """Spikes of the finger since the hello, those too that no answer carried; modulo 2^32."""
-
-
-def read(message: bytes, offset: int, client_time_us: int) -> Spikes:
-    """The section at `offset`."""
-    total, count = _HEAD.unpack_from(message, offset)
-    found = np.frombuffer(message, _SPIKE, count, offset + _HEAD.size)
-    return Spikes(found["unit"].copy(), client_time_us - found["before_us"].astype(np.int64), total)
 
 
 class SpikeTrains:

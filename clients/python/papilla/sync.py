@@ -18,7 +18,7 @@ from .http import DEFAULT_URL
 from .wire import Window
 
 if TYPE_CHECKING:
-    from .rendering import Progress
+    from .send_series import Progress
     from .series import Series
 
 _T = TypeVar("_T")
@@ -184,7 +184,8 @@ class Session:
 
         What the session remembers goes on from what it was. No other thread may send meanwhile.
         """
-        from .rendering import on_session
+        # Whoever sends frame by frame does not pay for it.
+        from .send_series import on_session
 
         return on_session(self, frames, times, unit=unit, progress=progress)
 
@@ -198,7 +199,7 @@ class Session:
         progress: Progress = None,
     ) -> Iterator[Series]:
         """`series` for what does not fit in memory: a result for each `chunk` frames."""
-        from .rendering import chunks_on_session
+        from .send_series import chunks_on_session
 
         return chunks_on_session(self, frames, times, chunk=chunk, unit=unit, progress=progress)
 

@@ -9,9 +9,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from .. import check, rendering
+from .. import check
 from ..errors import BadInput
 from ..http import DEFAULT_URL
+from ..rendering import render_chunks
+from ..send_series import Progress, line
 from ..series import Series, joined
 from ..wire import Map
 from .expect import Expected, expected
@@ -84,7 +86,7 @@ def sense(
     tier: str | None = None,
     effects: Sequence[str] = ("summary", "afferents"),
     maps: bool = True,
-    progress: rendering.Progress = None,
+    progress: Progress = None,
     **hello: Any,
 ) -> Sensed:
     """SED, firing rates and, with the effect `spikes`, spikes under a sensor over time.
@@ -120,7 +122,7 @@ def sense(
 
     series = joined(
         list(
-            rendering.render_chunks(
+            render_chunks(
                 fields(), record.times_s, chunk=_BATCH, unit="Pa", url=url, token=token, effects=names,
                 progress=_of(progress, len(record.readings)), **hello,
             )
@@ -136,10 +138,10 @@ def sense(
     return Sensed(series, due, warnings)
 
 
-def _of(progress: rendering.Progress, total: int) -> rendering.Progress:
+def _of(progress: Progress, total: int) -> Progress:
     """The same, told how many frames there are."""
     if not callable(progress):
-        return (lambda done, _: rendering.line(done, total)) if progress else None
+        return (lambda done, _: line(done, total)) if progress else None
     tell = progress
     return lambda done, _: tell(done, total)
 
