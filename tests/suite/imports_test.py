@@ -42,4 +42,6 @@ class Imports(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    done = unittest.main(exit=False, verbosity=0).result
+    print(f"checks: {done.testsRun - len(done.failures) - len(done.errors)}")
+    raise SystemExit(not done.wasSuccessful())
