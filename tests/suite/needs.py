@@ -56,6 +56,12 @@ def no_onnxruntime() -> str | None:
     return "no ONNX Runtime here: pip could not install it"
 
 
+def no_prometheus() -> str | None:
+    if shutil.which("promtool") or (shutil.which("apt-get") and shutil.which("dpkg")):
+        return None
+    return "no promtool here, and no apt-get to fetch it"
+
+
 def no_musl() -> str | None:
     if os.geteuid() == 0 and shutil.which("musl-gcc") and shutil.which("dpkg"):
         return None

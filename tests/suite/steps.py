@@ -19,6 +19,7 @@ from needs import (
     no_musl,
     no_nightly,
     no_onnxruntime,
+    no_prometheus,
     no_qemu,
     no_slurm,
     no_validator,
@@ -182,10 +183,18 @@ def full() -> list[Step]:
         ),
         Step(
             "interop",
-            "tritonclient and Prometheus' parser against the service",
+            "tritonclient, Prometheus' parser, Grafana's schema and PromQL against the service",
             "tests/interop/run",
             after=("build", "python"),
-            tests_min=5,
+            tests_min=14,
+        ),
+        Step(
+            "alerts",
+            "the alert rules fire, and every panel of the dashboard shows something, in Prometheus itself",
+            "deploy/prometheus/test",
+            after=("build",),
+            missing=no_prometheus,
+            installs="apt: prometheus, unpacked and not installed (19 MB)",
         ),
         Step(
             "processors",
