@@ -48,4 +48,5 @@
 mod body_file;
 pub mod campaign;
 pub mod cli;
+mod contact_model;
 pub mod influence_file;

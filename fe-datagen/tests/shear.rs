@@ -112,7 +112,13 @@ fn errors(record: &IncrementRecord, contact: &Contact) -> Errors {
 
 /// A small-strain finger of few vertices without second order.
 fn small_strain_finger() -> Arc<ContactModel> {
-    let body = influence::body(Density::Coarse, Order::Linear, &TissueTable::default()).unwrap();
+    let body = influence::body(
+        &Default::default(),
+        Density::Coarse,
+        Order::Linear,
+        &TissueTable::default(),
+    )
+    .unwrap();
     let compliance = influence::compliance(&body, &mut |_| ()).unwrap();
     let (atlas, _) = body.atlas().unwrap().unwrap();
     let positions_mm = atlas.patch(Patch::Skin).positions_mm.as_flattened().to_vec();

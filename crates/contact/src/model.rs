@@ -43,6 +43,10 @@ pub struct Header {
     /// Deepest training indentation, mm; beyond it an answer is out of range. 0: not known.
     #[serde(default)]
     pub depth_max_mm: f32,
+    /// Hash of the finger's dimensions and tissues, as `fe-datagen finger explain` prints it; empty:
+    /// not known. Bone and tissues do not show in the atlas.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub finger_sha256: String,
     /// Layers below the middle of the pad, from the surface down to the bone; none: pixels cannot be
     /// solved.
     #[serde(default)]

@@ -16,6 +16,9 @@ pub(super) struct Args {
     /// Mesh density whose surface is flattened: coarse, medium or fine.
     #[arg(long, default_value = "medium", value_parser = density)]
     density: Density,
+    /// A finger of your own: its folder, or its name in `fingers/`.
+    #[arg(long, value_name = "FINGER")]
+    finger: Option<PathBuf>,
     /// Folder for atlas.json.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -34,7 +37,8 @@ fn density(name: &str) -> Result<Density, String> {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let body = Body::usual(args.density)?;
+    let finger = super::finger::named(args.finger.as_deref())?;
+    let body = Body::even(&finger.shape, &finger.tissue, args.density)?;
     let (atlas, report) = body.atlas().context("a fingertip has an atlas patch")??;
     if let Some(folder) = &args.out {
         atomic::create_folder(folder)?;

@@ -5,7 +5,6 @@ use super::print;
 use crate::influence_file::{self, Card};
 use papilla_fingertip::influence;
 use papilla_fingertip::mesh::fingertip::Order;
-use papilla_fingertip::scene::TissueTable;
 use papilla_progress::{Progress, processor};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,6 +28,9 @@ pub(super) struct Args {
     /// Mesh density; its skin gives the vertices (a dataset's atlas is of medium).
     #[arg(long, value_enum, default_value = "medium")]
     density: Density,
+    /// A finger of your own: its folder, or its name in `fingers/`.
+    #[arg(long, value_name = "FINGER")]
+    finger: Option<PathBuf>,
     /// Folder for operator.npz and operator.json.
     #[arg(long)]
     out: PathBuf,
@@ -41,9 +43,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     // Before minutes of work: can it be written?
     papilla_output::atomic::create_folder(&args.out)?;
     let begun_s = processor::thread_s();
-    let (order, materials) = (Order::Linear, TissueTable::default());
+    let finger = super::finger::named(args.finger.as_deref())?;
+    let (order, materials) = (Order::Linear, finger.tissue);
     let density = args.density.into();
-    let body = influence::body(density, order, &materials)?;
+    let body = influence::body(&finger.shape, density, order, &materials)?;
     let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
     let progress = Progress::new("vertices", vertices, 0, args.json);
     let operator = influence::build(&body, &mut |done| progress.set_position(done))?;

@@ -9,6 +9,7 @@ mod dataset;
 mod explain;
 mod explain_campaign;
 mod export;
+mod finger;
 mod generate;
 mod influence;
 mod lines;
@@ -50,6 +51,7 @@ enum Command {
     Generate(generate::Args),
     Operator(influence::Args),
     Contact(contact::Args),
+    Finger(finger::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Convergence(convergence::Args),
@@ -74,6 +76,7 @@ pub fn run() -> ExitCode {
         Command::Generate(args) => generate::run(&args),
         Command::Operator(args) => influence::run(&args),
         Command::Contact(args) => contact::run(&args),
+        Command::Finger(args) => finger::run(&args),
     };
     finished(result)
 }

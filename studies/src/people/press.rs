@@ -117,7 +117,12 @@ impl Press {
     pub(crate) fn scene(&self, cells: Cells, depth_mm: f64) -> Scene {
         let Cells { density, order } = cells;
         Scene {
-            geometry: Geometry::Fingertip { density, order, shape: FingertipShape::default() },
+            geometry: Geometry::Fingertip {
+                density,
+                order,
+                shape: FingertipShape::default(),
+                finger: None,
+            },
             materials: self.tissues.elastic(),
             indenter: self.indenter.clone(),
             motion: Motion::to_depth(depth_mm, 1, self.pose()),

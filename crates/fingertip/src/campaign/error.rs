@@ -1,6 +1,6 @@
 //! Why a campaign file is refused.
 
-use crate::scene::SceneError;
+use crate::scene::{FingerError, SceneError};
 use std::path::PathBuf;
 
 /// A campaign that cannot be read, or makes no sense.
@@ -31,6 +31,14 @@ pub enum SpecError {
         field: String,
         /// What is wrong and what is allowed.
         message: String,
+    },
+    /// The finger that the campaign names.
+    #[error("campaign {campaign}: finger: {source}")]
+    Finger {
+        /// Name of the campaign.
+        campaign: String,
+        /// What is wrong with it.
+        source: Box<FingerError>,
     },
     /// A value that a scene could not have either.
     #[error("campaign {campaign}, indenter '{indenter}': {source}")]

@@ -4,9 +4,11 @@ use super::error::SpecError;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::effects::usual;
+use crate::scene::finger::sha256_of;
 use crate::scene::has_key;
 use crate::scene::{
-    Biphasic, EffectName, Friction, Geometry, Motion, Origin, Pose, Scene, TissueTable,
+    Biphasic, EffectName, Finger, FingerError, Friction, Geometry, Motion, Origin, Pose, Scene,
+    TissueTable,
 };
 use papilla_sdf::IndenterSpec;
 use serde::{Deserialize, Serialize};
@@ -97,6 +99,16 @@ pub struct CampaignSpec {
     /// say. Manifests do not name it where it is linear.
     #[serde(default, skip_serializing_if = "Order::is_linear")]
     pub order: Order,
+    /// A finger of one's own, as in a scene's geometry: the folder of its `finger.toml`, or its name in
+    /// `fingers/`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finger: Option<PathBuf>,
+    /// Hash of that finger's dimensions and tissues; manifests hold it.
+    #[serde(skip_deserializing, skip_serializing_if = "Option::is_none")]
+    pub finger_sha256: Option<String>,
+    /// Dimensions of that finger, or the default's.
+    #[serde(skip)]
+    pub shape: FingertipShape,
     /// Effects, as in a scene.
     #[serde(default = "usual")]
     pub effects: Vec<EffectName>,
@@ -159,8 +171,24 @@ impl CampaignSpec {
         let mut spec: Self = toml::from_str(&text)
             .map_err(|e| SpecError::Spec { path: path.to_path_buf(), message: e.to_string() })?;
         spec.folder = path.parent().unwrap_or(Path::new("")).into();
+        spec.take_finger(&text).map_err(|source| SpecError::Finger {
+            campaign: spec.name.clone(),
+            source: Box::new(source),
+        })?;
         spec.validate()?;
         Ok(spec)
+    }
+
+    /// Reads the finger that the file names; its tissues stand where the file gives none.
+    fn take_finger(&mut self, text: &str) -> Result<(), FingerError> {
+        let Some(name) = &self.finger else { return Ok(()) };
+        let found = Finger::find(name, &self.folder)?;
+        if !has_key(text, "materials") {
+            self.materials = found.tissue;
+        }
+        self.finger_sha256 = Some(sha256_of(&found.shape, &self.materials));
+        self.shape = found.shape;
+        Ok(())
     }
 
     /// The indenters; a single one is called after its shape.
@@ -182,7 +210,8 @@ impl CampaignSpec {
             geometry: Geometry::Fingertip {
                 density: self.density,
                 order: self.order,
-                shape: FingertipShape::default(),
+                shape: self.shape.clone(),
+                finger: self.finger.clone(),
             },
             materials: self.materials.clone(),
             indenter: candidate.indenter.clone(),
@@ -205,6 +234,11 @@ impl CampaignSpec {
     pub fn validate(&self) -> Result<(), SpecError> {
         let require = |ok, field: &str, message| self.require(ok, field, message);
         require(!self.name.trim().is_empty(), "name", "must not be empty".into())?;
+        require(
+            self.finger.is_some() == self.finger_sha256.is_some(),
+            "finger",
+            "was not looked for: a campaign that names one is read from its file".into(),
+        )?;
         require(
             (1..=PRESSES_MAX).contains(&self.presses),
             "presses",

@@ -1,6 +1,7 @@
 //! Campaigns that tests of this crate and of others share.
 
 use super::{CampaignSpec, Candidate, DepthRange, PoseRanges};
+use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::effects::usual;
 use crate::scene::{Friction, TissueTable};
@@ -19,6 +20,9 @@ pub fn spec() -> CampaignSpec {
         test_fraction: 0.3,
         density: Density::Coarse,
         order: Order::Linear,
+        finger: None,
+        finger_sha256: None,
+        shape: FingertipShape::default(),
         effects: usual(),
         materials: TissueTable::default(),
         friction: Friction::default(),

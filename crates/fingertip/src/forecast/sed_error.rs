@@ -91,9 +91,10 @@ impl SedError {
 #[must_use]
 pub fn better(geometry: &Geometry) -> Option<Geometry> {
     let (error, _) = SedError::of(geometry)?;
-    let Geometry::Fingertip { shape, .. } = geometry else { return None };
-    let (density, order) = (Density::Medium, Order::Graded);
-    (!error.is_small()).then_some(Geometry::Fingertip { density, order, shape: *shape })
+    let Geometry::Fingertip { shape, finger, .. } = geometry else { return None };
+    let (density, order, shape, finger) =
+        (Density::Medium, Order::Graded, shape.clone(), finger.clone());
+    (!error.is_small()).then_some(Geometry::Fingertip { density, order, shape, finger })
 }
 
 #[cfg(test)]
@@ -102,7 +103,7 @@ mod tests {
     use crate::geometry::fingertip::FingertipShape;
 
     fn finger(density: Density, order: Order) -> Geometry {
-        Geometry::Fingertip { density, order, shape: FingertipShape::default() }
+        Geometry::Fingertip { density, order, shape: FingertipShape::default(), finger: None }
     }
 
     /// The table says what the ladder measured.

@@ -29,6 +29,7 @@ pub use error::InfluenceError;
 pub use second_order::{Load, SecondOrder, second_order};
 pub use strain::COMPONENTS;
 
+use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::TissueTable;
 use crate::scene::effects::{Law, Plan};
@@ -113,22 +114,16 @@ impl InfluenceOperator {
     }
 }
 
-/// The fingertip of the design at small strain: layers, rigid bone and nail.
+/// A fingertip at small strain: layers, rigid bone and nail.
 ///
 /// # Errors
 /// [`SimulationError`] if it cannot be set up.
 pub fn body(
+    shape: &FingertipShape,
     density: Density,
     order: Order,
     materials: &TissueTable,
 ) -> Result<Body, SimulationError> {
     let plan = Plan { law: Law::Linear, ..Plan::usual() };
-    Body::fingertip(
-        &Default::default(),
-        solids(materials, &plan)?,
-        density,
-        order,
-        plan.parts,
-        None,
-    )
+    Body::fingertip(shape, solids(materials, &plan)?, density, order, plan.parts, None)
 }

@@ -14,7 +14,9 @@ use std::sync::OnceLock;
 fn finger() -> &'static (Body, InfluenceOperator) {
     static FINGER: OnceLock<(Body, InfluenceOperator)> = OnceLock::new();
     FINGER.get_or_init(|| {
-        let body = body(Density::Coarse, Order::Linear, &TissueTable::default()).unwrap();
+        let body =
+            body(&Default::default(), Density::Coarse, Order::Linear, &TissueTable::default())
+                .unwrap();
         let operator = build(&body, &mut |_| ()).unwrap();
         (body, operator)
     })

@@ -11,6 +11,8 @@ pub(super) struct Quality {
     /// elements' nodes: 1 for a brick, 0 where it folds (Verdict's scaled
     /// Jacobian, taken at all 27 nodes of a `Hex27`).
     pub scaled_jacobian_min: f64,
+    /// The node where it is that.
+    pub worst_node: u32,
     /// Greatest ratio of an element's longest to its shortest axis, by the
     /// columns of `dX/dxi` at its centre.
     pub aspect_max: f64,
@@ -18,7 +20,8 @@ pub(super) struct Quality {
 
 /// Quality of the elements of a tissue in a mesh of hexahedra.
 pub(super) fn of(mesh: &Mesh, tissue: Tissue) -> Quality {
-    let mut quality = Quality { elements: 0, scaled_jacobian_min: f64::INFINITY, aspect_max: 0.0 };
+    let mut quality =
+        Quality { elements: 0, scaled_jacobian_min: f64::INFINITY, worst_node: 0, aspect_max: 0.0 };
     for block in &mesh.blocks {
         for e in (0..block.len()).filter(|&e| block.region[e] == tissue.region()) {
             quality.elements += 1;
@@ -26,7 +29,11 @@ pub(super) fn of(mesh: &Mesh, tissue: Tissue) -> Quality {
             for a in 0..block.kind.nodes() {
                 let c = columns(block.kind.node_xi(a));
                 let scaled = determinant(&c) / c.iter().map(|v| length(*v)).product::<f64>();
-                quality.scaled_jacobian_min = quality.scaled_jacobian_min.min(scaled);
+                // NaN is worst of all.
+                if !(scaled >= quality.scaled_jacobian_min) {
+                    quality.scaled_jacobian_min = scaled;
+                    quality.worst_node = block.element(e)[a];
+                }
             }
             let axes = columns([0.0; 3]).map(length);
             let longest = axes.into_iter().fold(0.0, f64::max);

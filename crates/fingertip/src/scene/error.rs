@@ -69,6 +69,9 @@ pub enum SceneError {
     /// A fingertip whose dimensions make no sense.
     #[error(transparent)]
     Shape(#[from] crate::geometry::fingertip::FingertipShapeError),
+    /// A finger's file.
+    #[error(transparent)]
+    Finger(#[from] super::finger::FingerError),
     /// Any of these, at its line.
     #[error(transparent)]
     Located(Box<Located<Self>>),
@@ -103,6 +106,10 @@ impl SceneError {
             Self::Indenter(e) => Some(indenter_field(e)),
             Self::Shape(e) => Some(e.field()),
             Self::Section(e) => Some(e.field()),
+            // Others have a line of the finger's own file.
+            Self::Finger(super::finger::FingerError::Missing { .. }) => {
+                Some("geometry.finger".into())
+            }
             Self::Located(e) => e.error.field(),
             _ => None,
         }
@@ -125,7 +132,7 @@ impl SceneError {
 }
 
 /// What to do about a parser's message, where it does not say so itself.
-fn cure(message: &str) -> String {
+pub(super) fn cure(message: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     if let (Some(missing), true) = (quoted.first(), message.starts_with("missing field")) {
         return format!(": add it (docs/reference/scenes.md has `{missing}` with its unit)");

@@ -25,6 +25,10 @@ pub enum Geometry {
         /// Dimensions that differ from the default.
         #[serde(default)]
         shape: FingertipShape,
+        /// A finger of one's own, in place of `shape`: the folder of its `finger.toml`, from the
+        /// scene's folder or the current one, or its name in `fingers/` there.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        finger: Option<PathBuf>,
     },
     /// The fingertip's cross-section, for the effect `plane_strain`. Forces and
     /// energies are per mm of length.

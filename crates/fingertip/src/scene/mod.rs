@@ -7,6 +7,7 @@ pub(crate) mod biphasic;
 mod census;
 pub mod effects;
 pub(crate) mod error;
+pub mod finger;
 mod geometry;
 mod materials;
 mod motion;
@@ -19,6 +20,7 @@ pub use biphasic::{Biphasic, SkinFlow};
 pub use census::Census;
 pub use effects::{EffectName, Plan};
 pub use error::SceneError;
+pub use finger::{Finger, FingerError};
 pub use geometry::{Geometry, Layer};
 pub use materials::{MaterialSet, TissueError, TissueTable};
 pub use motion::{Motion, PathPoint, Pose};
@@ -105,6 +107,7 @@ impl Scene {
                 density: Density::Coarse,
                 order: Order::Linear,
                 shape: FingertipShape::default(),
+                finger: None,
             },
             materials: TissueTable::default(),
             indenter: IndenterSpec::default(),
@@ -143,10 +146,30 @@ impl Scene {
         let mut scene = parsed.map_err(|e| SceneError::parse(&origin, &e))?;
         scene.folder = path.parent().unwrap_or(Path::new("")).into();
         scene.origin = origin;
+        if let Err(e) = scene.take_finger() {
+            return Err(e.at(&scene));
+        }
         match scene.validate() {
             Ok(()) => Ok(scene),
             Err(e) => Err(e.at(&scene)),
         }
+    }
+
+    /// Reads the finger that the geometry names; its tissues stand where the file gives none.
+    fn take_finger(&mut self) -> Result<(), SceneError> {
+        let Geometry::Fingertip { shape, finger: Some(name), .. } = &mut self.geometry else {
+            return Ok(());
+        };
+        if self.origin.has("geometry.shape") {
+            let rule = "and geometry.finger both give dimensions: name one of the two";
+            return Err(SceneError::Fields { field: "geometry.shape", rule });
+        }
+        let found = Finger::find(name, &self.folder)?;
+        *shape = found.shape;
+        if !self.origin.has("materials") {
+            self.materials = found.tissue;
+        }
+        Ok(())
     }
 
     /// Where the file says what `field` is; `None` for a scene made by a program or

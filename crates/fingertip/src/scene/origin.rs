@@ -98,6 +98,12 @@ impl Origin {
         }
     }
 
+    /// Whether the file says what a field is.
+    #[must_use]
+    pub fn has(&self, field: &str) -> bool {
+        self.entries().iter().any(|e| e.path == field)
+    }
+
     /// Field and place that a parser's message with this span is about. Of what
     /// is read by `kind` or `shape` the parser knows the table alone; the word that
     /// it complains of is looked up there.

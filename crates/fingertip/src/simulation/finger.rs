@@ -81,9 +81,20 @@ impl Body {
     /// # Errors
     /// [`SimulationError`] if it cannot be set up.
     pub fn usual(density: Density) -> Result<Self, SimulationError> {
+        Self::even(&FingertipShape::default(), &TissueTable::default(), density)
+    }
+
+    /// A finger on an even mesh with the surface-pressure study's analysis.
+    ///
+    /// # Errors
+    /// [`SimulationError`] if it cannot be set up.
+    pub fn even(
+        shape: &FingertipShape,
+        tissues: &TissueTable,
+        density: Density,
+    ) -> Result<Self, SimulationError> {
         let plan = Plan::usual();
-        let materials = solids(&TissueTable::default(), &plan)?;
-        let shape = FingertipShape::default();
-        Self::fingertip(&shape, materials, density, Order::Linear, plan.parts, None)
+        let materials = solids(tissues, &plan)?;
+        Self::fingertip(shape, materials, density, Order::Linear, plan.parts, None)
     }
 }

@@ -70,7 +70,7 @@ fn body(
 ) -> Result<Body, SimulationError> {
     let materials = solids(&scene.materials, plan)?;
     match &scene.geometry {
-        Geometry::Fingertip { density, order, shape } => {
+        Geometry::Fingertip { density, order, shape, .. } => {
             let contact = (*order == Order::Graded).then(|| approach.contact_with(shape, drive));
             Body::fingertip(
                 shape,

@@ -142,7 +142,8 @@ fn scene(case: &Case, mesh: MeshChoice, states: usize, target: &Target) -> Scene
         geometry: Geometry::Fingertip {
             density: mesh.density,
             order: mesh.order,
-            shape: target.finger,
+            shape: target.finger.clone(),
+            finger: None,
         },
         indenter: target.indenter.clone(),
         motion: case.motion(states),

@@ -1,6 +1,7 @@
 //! Shapes that no finger has: refused, with the field to blame.
 
-use super::FingertipShape;
+use super::offset::{at_uv, uv};
+use super::{FingertipShape, SKIN_SHARE_MAX, SurfaceParameter};
 
 /// Why a shape was refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -75,6 +76,47 @@ pub enum FingertipShapeError {
         /// Whether it has to be at least that, or at most.
         least: bool,
     },
+    /// Elements are folded, or nearly, at a place.
+    #[error(
+        "the {tissue} folds at the {region} (u = {u:.2}, v = {v:.2}; x = {:.1}, y = {:.1}, z = {:.1} mm): scaled \
+         Jacobian {scaled_jacobian:.3}, {} is the least. Smooth the skin there, or make the layers thinner, the \
+         bone slimmer",
+        at_mm[0], at_mm[1], at_mm[2], crate::mesh::fingertip::SCALED_JACOBIAN_MIN
+    )]
+    Distorted {
+        /// Which layer.
+        tissue: &'static str,
+        /// Where on the finger, in words.
+        region: &'static str,
+        /// Turns round the finger, from the palmar line.
+        u: f64,
+        /// 0 at the tip's pole, 1 at the cap's equator, 2 at the base plane.
+        v: f64,
+        /// The place.
+        at_mm: [f64; 3],
+        /// The least of an element there.
+        scaled_jacobian: f64,
+    },
+    /// Epidermis and dermis are thicker than what lies between skin and bone.
+    #[error(
+        "epidermis and dermis are {layers_mm:.2} mm thick, and the skin of the pad is only {gap_mm:.2} mm above the \
+         bone at x = {x_mm:.2}, y = {y_mm:.2}, z = {z_mm:.2} mm: they may take {most_mm:.2} mm there. Make them thinner, the \
+         bone slimmer or further from the pad"
+    )]
+    LayersTooThick {
+        /// Both layers.
+        layers_mm: f64,
+        /// From skin to bone along the normal.
+        gap_mm: f64,
+        /// What they may take.
+        most_mm: f64,
+        /// Skin point.
+        x_mm: f64,
+        /// Skin point.
+        y_mm: f64,
+        /// Skin point.
+        z_mm: f64,
+    },
     /// Lengths contradict each other.
     #[error("geometry.shape: {0}")]
     Inconsistent(&'static str),
@@ -95,7 +137,8 @@ impl FingertipShapeError {
             Self::CortexTooThick { .. } => "bone_cortex_mm",
             Self::NailTooSmall => "nail_mm",
             Self::Folds { field, .. } => field.as_str(),
-            Self::BoneTooClose { .. } => return "geometry.shape".into(),
+            Self::LayersTooThick { .. } => "dermis_mm",
+            Self::BoneTooClose { .. } | Self::Distorted { .. } => return "geometry.shape".into(),
             Self::Inconsistent(rule) => rule.split(' ').find(|w| w.contains('_')).unwrap_or(""),
         };
         format!("geometry.shape.{name}")
@@ -172,6 +215,74 @@ impl FingertipShape {
             ));
         }
         Ok(())
+    }
+
+    /// Checks that the bone lies below the skin everywhere, and that epidermis and dermis fit
+    /// between them under the pad. Elsewhere they may be squeezed: under the nail and at the tip
+    /// skin is thinner.
+    ///
+    /// # Errors
+    /// [`FingertipShapeError::BoneTooClose`] or [`FingertipShapeError::LayersTooThick`] with the
+    /// worst place.
+    pub fn validate_layers(&self) -> Result<(), FingertipShapeError> {
+        const STEPS: u32 = 48;
+        let mut worst: Option<(f64, FingertipShapeError)> = None;
+        for k in 0..=STEPS * STEPS {
+            let [i, j] = [k / STEPS, k % STEPS].map(|n| f64::from(n) / f64::from(STEPS));
+            if let Err(error @ FingertipShapeError::BoneTooClose { gap_mm, .. }) =
+                self.layers(at_uv([j, 2.0 * i]))
+                && worst.as_ref().is_none_or(|(gap, _)| gap_mm < *gap)
+            {
+                worst = Some((gap_mm, error));
+            }
+        }
+        if let Some((_, error)) = worst {
+            return Err(error);
+        }
+        let pad = SurfaceParameter::Body([0.0, -1.0], 0.0);
+        let (skin, bone, normal) = (self.skin(pad), self.bone(pad), self.skin_normal_at(pad));
+        let gap_mm: f64 = (0..3).map(|i| (skin[i] - bone[i]) * normal[i]).sum();
+        let (layers_mm, most_mm) = (self.epidermis_mm + self.dermis_mm, SKIN_SHARE_MAX * gap_mm);
+        if layers_mm > most_mm {
+            let [x_mm, y_mm, z_mm] = skin;
+            let error = FingertipShapeError::LayersTooThick {
+                layers_mm,
+                gap_mm,
+                most_mm,
+                x_mm,
+                y_mm,
+                z_mm,
+            };
+            return Err(error);
+        }
+        Ok(())
+    }
+
+    /// Where a place of the skin is on the finger, in words.
+    #[must_use]
+    pub fn region(&self, s: SurfaceParameter) -> &'static str {
+        const FOLD_MM: f64 = 2.0;
+        let (p, [u, v]) = (self.template_skin(s), uv(s));
+        let beside = p[1].abs() - 0.5 * self.nail_mm[0];
+        let along = (p[0] - self.nail_tip_mm).min(self.nail_tip_mm + self.nail_mm[1] - p[0]);
+        let dorsal = p[2] > 0.25 * self.height_mm;
+        if dorsal && beside.abs() <= FOLD_MM && along >= -FOLD_MM {
+            "nail fold"
+        } else if dorsal && beside < 0.0 && along.abs() <= FOLD_MM {
+            "nail's end"
+        } else if self.under_nail(p) {
+            "nail bed"
+        } else if v < 0.5 {
+            "tip"
+        } else if v > 1.8 {
+            "base plane"
+        } else if u.min(1.0 - u) < 0.15 {
+            "pad"
+        } else if dorsal {
+            "back"
+        } else {
+            "side"
+        }
     }
 
     /// Checks that a solid bone's cortex leaves a marrow cavity. Not part of

@@ -8,18 +8,25 @@
 //! Chen, Shuai & Zhu; behind it the palmar side sinks by `crease_depth_mm`
 //! towards the joint, so a flat plate touches the pad and not the base.
 //! Bone: elliptic rod with base, waist and tuft, its axis offset to the nail.
+//!
+//! A particular finger may have a [`SkinOffset`]: its skin then lies that far from this template's,
+//! along the template's normals, and the layers below lie along the normals of its own skin.
 
 mod check;
+pub mod offset;
 
 pub use check::FingertipShapeError;
+pub use offset::{SkinOffset, SkinOffsetError};
 
 use check::GAP_MIN_MM;
+use papilla_solid::tensor::norm;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Dimensions of the fingertip, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FingertipShape {
     /// From the tip to the base plane.
@@ -61,6 +68,9 @@ pub struct FingertipShape {
     /// Bone: thickness of its cortex, around an empty marrow cavity. Only an
     /// elastic bone has one.
     pub bone_cortex_mm: f64,
+    /// How far the skin lies from this template's; a finger's own file gives it.
+    #[serde(skip)]
+    pub offset: Option<Arc<SkinOffset>>,
 }
 
 impl Default for FingertipShape {
@@ -85,6 +95,7 @@ impl Default for FingertipShape {
             nail_tip_mm: 2.0,
             nail_thickness_mm: 0.5,
             bone_cortex_mm: 0.75,
+            offset: None,
         }
     }
 }
@@ -99,6 +110,12 @@ pub enum SurfaceParameter {
     Body([f64; 2], f64),
 }
 
+/// Steps towards the parameter of a point of a skin with an offset: each leaves some tenth of the
+/// error, since an offset changes by about that over the way that it moves the skin.
+const PARAMETER_STEPS: usize = 12;
+/// Half the way over which directions along a skin with an offset are taken, mm.
+const TANGENT_MM: f64 = 1e-4;
+
 /// Share of the gap between skin and bone that epidermis and dermis may take.
 const SKIN_SHARE_MAX: f64 = 0.75;
 
@@ -106,6 +123,15 @@ impl FingertipShape {
     /// Skin point of a parameter, mm.
     #[must_use]
     pub fn skin(&self, s: SurfaceParameter) -> [f64; 3] {
+        let p = self.template_skin(s);
+        let Some(offset) = &self.offset else { return p };
+        let (n, by) = (self.template_normal(p), offset.at(s));
+        std::array::from_fn(|i| p[i] + by * n[i])
+    }
+
+    /// Skin point of a parameter without the finger's own offset, mm.
+    #[must_use]
+    pub fn template_skin(&self, s: SurfaceParameter) -> [f64; 3] {
         match s {
             SurfaceParameter::Cap(d) => {
                 let e = self.cap_exponent;
@@ -126,13 +152,24 @@ impl FingertipShape {
     }
 
     /// Parameter of the point of the skin that lies on the line from the finger's axis through
-    /// `p` (mm).
+    /// `p` (mm); with an offset, of the point of the skin whose offset leads to `p` if it is on the
+    /// skin, and near there if it is near.
     #[must_use]
     pub fn parameter_of(&self, p: [f64; 3]) -> SurfaceParameter {
+        let mut s = self.template_parameter_of(p);
+        let Some(offset) = &self.offset else { return s };
+        for _ in 0..PARAMETER_STEPS {
+            let (n, by) = (self.template_normal(self.template_skin(s)), offset.at(s));
+            s = self.template_parameter_of(std::array::from_fn(|i| p[i] - by * n[i]));
+        }
+        s
+    }
+
+    fn template_parameter_of(&self, p: [f64; 3]) -> SurfaceParameter {
         let (y, x) = (p[1] / (0.5 * self.width_mm), p[0] - self.cap_length_mm);
         if x < 0.0 {
             let d = [x / self.cap_length_mm, y, p[2] / (0.5 * self.height_mm)];
-            let size = papilla_solid::tensor::norm(d);
+            let size = norm(d);
             SurfaceParameter::Cap(d.map(|v| v / size))
         } else {
             let b = if p[2] < 0.0 { self.palmar_half_height(p[0]) } else { 0.5 * self.height_mm };
@@ -169,6 +206,35 @@ impl FingertipShape {
     /// Outward unit normal of the skin at one of its points.
     #[must_use]
     pub fn skin_normal(&self, p: [f64; 3]) -> [f64; 3] {
+        match &self.offset {
+            None => self.template_normal(p),
+            Some(_) => self.skin_normal_at(self.parameter_of(p)),
+        }
+    }
+
+    /// Outward unit normal of the skin at a parameter.
+    #[must_use]
+    pub fn skin_normal_at(&self, s: SurfaceParameter) -> [f64; 3] {
+        let p = self.template_skin(s);
+        let n = self.template_normal(p);
+        if self.offset.is_none() {
+            return n;
+        }
+        let along = tangents(n).map(|t| {
+            let on = |by: f64| {
+                let q = std::array::from_fn(|i| p[i] + by * t[i]);
+                self.skin(self.template_parameter_of(q))
+            };
+            let (a, b) = (on(TANGENT_MM), on(-TANGENT_MM));
+            std::array::from_fn(|i| a[i] - b[i])
+        });
+        let [u, v]: [[f64; 3]; 2] = along;
+        let across = cross(u, v);
+        let size = norm(across);
+        across.map(|c| c / size)
+    }
+
+    fn template_normal(&self, p: [f64; 3]) -> [f64; 3] {
         let h = 1e-5;
         let mut g: [f64; 3] = std::array::from_fn(|i| {
             let (mut a, mut b) = (p, p);
@@ -176,7 +242,7 @@ impl FingertipShape {
             b[i] -= h;
             self.skin_level(a) - self.skin_level(b)
         });
-        let length = papilla_solid::tensor::norm(g);
+        let length = norm(g);
         for v in &mut g {
             *v /= length;
         }
@@ -231,7 +297,7 @@ impl FingertipShape {
     /// [`FingertipShapeError::BoneTooClose`] where the bone leaves no room.
     pub fn layers(&self, s: SurfaceParameter) -> Result<[[f64; 3]; 4], FingertipShapeError> {
         let skin = self.skin(s);
-        let normal = self.skin_normal(skin);
+        let normal = self.skin_normal_at(s);
         let bone = self.bone(s);
         let gap: f64 = (0..3).map(|i| (skin[i] - bone[i]) * normal[i]).sum();
         if !(gap >= GAP_MIN_MM) {
@@ -267,6 +333,22 @@ fn soft_min(a: f64, b: f64) -> f64 {
     let width = 0.1;
     let d = ((b - a) / width).clamp(-1.0, 1.0);
     a.min(b) - 0.25 * width * (1.0 - d.abs()).powi(2)
+}
+
+/// Two unit vectors across the unit vector `n`; their cross product is `n`.
+pub(crate) fn tangents(n: [f64; 3]) -> [[f64; 3]; 2] {
+    let k = (0..3).min_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs())).unwrap_or(0);
+    let u: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == k)) - n[k] * n[i]);
+    let size = norm(u);
+    let u = u.map(|v| v / size);
+    [u, cross(n, u)]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    })
 }
 
 /// Angle of a section direction from the palmar side, rad, in `(-pi, pi]`.

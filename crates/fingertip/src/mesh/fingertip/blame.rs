@@ -1,6 +1,6 @@
 //! Which dimension of a finger folds its mesh, and how far it may go.
 
-use super::{Density, FingertipShapeError, Order, Parts, build};
+use super::{Density, FingertipShapeError, Order, Parts, build, check_elements};
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::quality;
 use crate::tissue::Tissue;
@@ -11,6 +11,11 @@ const HALVINGS: u32 = 10;
 
 /// What to say of a shape whose mesh has elements that are inside out.
 pub(crate) fn blame(shape: &FingertipShape, parts: Parts) -> FingertipShapeError {
+    if let Err(distorted @ FingertipShapeError::Distorted { .. }) = check_elements(shape)
+        && shape.offset.is_some()
+    {
+        return distorted;
+    }
     changed(shape)
         .into_iter()
         .find_map(|(field, index)| culprit(shape, parts, &field, index))
@@ -57,7 +62,8 @@ fn culprit(
             Some(i) => *place.as_array_mut()?.get_mut(i)? = Value::Float(value),
             None => *place = Value::Float(value),
         }
-        table.try_into().ok()
+        let changed: FingertipShape = table.try_into().ok()?;
+        Some(FingertipShape { offset: shape.offset.clone(), ..changed })
     };
     let sound = |value: f64| with(value).is_some_and(|shape| is_sound(&shape, parts));
     let (value, usual) = (number(shape)?, number(&FingertipShape::default())?);

@@ -8,6 +8,7 @@
 //! whatever else is solid.
 
 mod blame;
+mod soundness;
 
 use super::extrude::Cells;
 use super::grading::{Closeness, Contact, Spacing};
@@ -24,6 +25,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use blame::blame;
+pub use soundness::{SCALED_JACOBIAN_MIN, check_elements};
 
 pub use super::leaves::Leaf;
 pub use super::patch::{Patch, Vertices};

@@ -1,8 +1,7 @@
 //! Where an indenter first touches the undeformed finger, whatever its mesh.
 
-use crate::geometry::fingertip::{FingertipShape, SurfaceParameter};
+use crate::geometry::fingertip::{FingertipShape, SurfaceParameter, tangents};
 use papilla_sdf::{Placement, SignedDistance};
-use papilla_solid::tensor::norm;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
@@ -149,19 +148,6 @@ fn least(
     Some(at)
 }
 
-/// Two unit vectors across `n`.
-fn tangents(n: [f64; 3]) -> [[f64; 3]; 2] {
-    let k = (0..3).min_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs())).unwrap_or(0);
-    let u: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == k)) - n[k] * n[i]);
-    let size = norm(u);
-    let u = u.map(|v| v / size);
-    let v = std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        n[j] * u[k] - n[k] * u[j]
-    });
-    [u, v]
-}
-
 /// Points of the skin, some .1 mm apart under the pad, whose outward normal is against
 /// `direction`.
 pub(super) fn facing(
@@ -181,10 +167,9 @@ pub(super) fn facing(
             } else {
                 SurfaceParameter::Body([y, -z], s - 1.0)
             };
-            let p = finger.skin(parameter);
-            let n = finger.skin_normal(p);
+            let n = finger.skin_normal_at(parameter);
             let along: f64 = (0..3).map(|i| n[i] * direction[i]).sum();
-            (along < -0.05).then_some(p)
+            (along < -0.05).then(|| finger.skin(parameter))
         })
     })
 }

@@ -1,0 +1,131 @@
+//! `finger explain`: what a finger's file says, and whether it can be meshed.
+
+use crate::cli::print;
+use papilla_fingertip::geometry::fingertip::SurfaceParameter;
+use papilla_fingertip::mesh::fingertip::{SCALED_JACOBIAN_MIN, check_elements};
+use papilla_fingertip::scene::Finger;
+use papilla_fingertip::scene::finger::{FIELDS, Source};
+use papilla_fingertip::tissue::Tissue;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Say what a finger is: every number with unit, default and range, what lies between skin and
+/// bone, and how well its elements are shaped. Nothing is solved and nothing written.
+#[derive(clap::Args)]
+#[command(after_help = "Example: fe-datagen finger explain fingers/mine")]
+pub(super) struct Args {
+    /// Folder of a finger, or its finger.toml.
+    finger: PathBuf,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A number, or several that belong together.
+#[derive(Serialize)]
+struct Number {
+    key: String,
+    value: String,
+    unit: &'static str,
+    default: String,
+    range: [f64; 2],
+    is: &'static str,
+}
+
+/// Young's modulus and Poisson's ratio of a tissue.
+#[derive(Serialize)]
+struct Elastic {
+    tissue: &'static str,
+    youngs_modulus_mpa: f64,
+    poissons_ratio: f64,
+}
+
+/// What `finger explain` says.
+#[derive(Serialize)]
+struct Explanation {
+    file: PathBuf,
+    sha256: String,
+    source: Source,
+    numbers: Vec<Number>,
+    /// Largest distance of the skin from the template that these numbers give; absent without a
+    /// skin of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset_mm_max: Option<f64>,
+    tissues: Vec<Elastic>,
+    /// Epidermis, dermis and fat below the middle of the pad.
+    below_pad_mm: [f64; 3],
+    /// Least scaled Jacobian of the soft tissue.
+    scaled_jacobian_min: f64,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let finger = Finger::read(&args.finger)?;
+    let (shape, usual) = (&finger.shape, Finger::usual().shape);
+    let bounds = shape.layers(SurfaceParameter::Body([0.0, -1.0], 0.0))?;
+    let below_pad_mm = std::array::from_fn(|k| {
+        let way: [f64; 3] = std::array::from_fn(|i| bounds[k + 1][i] - bounds[k][i]);
+        way.iter().map(|v| v * v).sum::<f64>().sqrt()
+    });
+    let number = |f: &papilla_fingertip::scene::finger::Field| Number {
+        key: f.dotted(),
+        value: f.written(shape),
+        unit: f.unit,
+        default: f.written(&usual),
+        range: f.range,
+        is: f.about,
+    };
+    let elastic = |&tissue: &Tissue| {
+        let spec = finger.tissue.of(tissue);
+        Elastic {
+            tissue: tissue.name(),
+            youngs_modulus_mpa: spec.youngs_modulus_mpa,
+            poissons_ratio: spec.poissons_ratio,
+        }
+    };
+    let explanation = Explanation {
+        file: args.finger.clone(),
+        sha256: finger.sha256(),
+        numbers: FIELDS.iter().map(number).collect(),
+        offset_mm_max: shape.offset.as_ref().map(|o| o.largest_mm()),
+        tissues: Tissue::ALL.iter().map(elastic).collect(),
+        below_pad_mm,
+        scaled_jacobian_min: check_elements(shape)?,
+        source: finger.source.clone(),
+    };
+    print(&explanation, args.json, || human(&explanation))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn human(e: &Explanation) -> String {
+    let mut text = format!("{}\n", e.file.display());
+    let Source { who, file, unit, date, licence } = &e.source;
+    for (name, value) in
+        [("who", who), ("file", file), ("unit", unit), ("date", date), ("licence", licence)]
+    {
+        if !value.is_empty() {
+            text += &format!("  {name:8} {value}\n");
+        }
+    }
+    text += &format!("\n{:22} {:>14} {:4} {:>14}  range\n", "number", "value", "unit", "default");
+    for n in &e.numbers {
+        let [low, high] = n.range;
+        text += &format!(
+            "{:22} {:>14} {:4} {:>14}  {low} to {high}: {}\n",
+            n.key, n.value, n.unit, n.default, n.is
+        );
+    }
+    if let Some(most) = e.offset_mm_max {
+        text += &format!("the skin lies up to {most:.2} mm from these dimensions (shape.skin)\n");
+    }
+    text += "\ntissue           Young's modulus MPa   Poisson's ratio, both at zero strain\n";
+    for t in &e.tissues {
+        text += &format!("{:16} {:19} {:17}\n", t.tissue, t.youngs_modulus_mpa, t.poissons_ratio);
+    }
+    let [epidermis, dermis, fat] = e.below_pad_mm;
+    text + &format!(
+        "\nbelow the middle of the pad: epidermis {epidermis:.2}, dermis {dermis:.2}, fat {fat:.2} mm, then \
+         bone\nelements: least scaled Jacobian {:.3} ({SCALED_JACOBIAN_MIN} is asked for)\nsha256 {}",
+        e.scaled_jacobian_min, e.sha256
+    )
+}

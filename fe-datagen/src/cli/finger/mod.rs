@@ -1,0 +1,45 @@
+//! `finger`: a finger of one's own.
+
+mod build;
+mod explain;
+mod new;
+
+use papilla_fingertip::scene::Finger;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Make a finger of your own, see what it is, and what the service needs of it.
+///
+/// A finger is a folder with `finger.toml`: some numbers, each with its unit, default and range.
+/// Scenes and campaigns name the folder. See docs/guides/fingers.md.
+#[derive(clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    New(new::Args),
+    Explain(explain::Args),
+    Build(build::Args),
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    match &args.command {
+        Command::New(args) => new::run(args),
+        Command::Explain(args) => explain::run(args),
+        Command::Build(args) => build::run(args),
+    }
+}
+
+/// The finger that an option names; the default one if it names none.
+///
+/// # Errors
+/// It is not there, or makes no sense.
+pub(super) fn named(name: Option<&Path>) -> anyhow::Result<Finger> {
+    match name {
+        Some(name) => Ok(Finger::find(name, Path::new(""))?),
+        None => Ok(Finger::usual()),
+    }
+}
