@@ -85,8 +85,8 @@ fn a_bone_outside_of_the_skin_is_named_with_its_place() {
 
 #[test]
 fn layers_thicker_than_the_pulp_are_named_with_their_place() {
-    let e = "[layers]\nepidermis_mm = 1.0\ndermis_mm = 3.0\n[bone]\noffset_mm = -1.0\n";
-    assert_refused(e, 3, &["4.00 mm thick", "above the bone at x = 11.25", "they may take"]);
+    let e = "[layers]\nepidermis_mm = 1.5\ndermis_mm = 3.0\n[bone]\noffset_mm = 0.5\n";
+    assert_refused(e, 3, &["4.50 mm thick", "above the bone at x = 11.25", "they may take"]);
 }
 
 #[test]
