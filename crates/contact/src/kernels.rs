@@ -202,21 +202,6 @@ impl WithSimd for Along<'_> {
     }
 }
 
-/// Transposes lines of `length`, some lines at once so that both sides are read and written
-/// along.
-pub(crate) fn turn<T: Copy>(from: &[T], length: usize, to: &mut [T]) {
-    const TOGETHER: usize = 8;
-    let lines = from.len() / length;
-    for first in (0..lines).step_by(TOGETHER) {
-        let last = (first + TOGETHER).min(lines);
-        for column in 0..length {
-            for (line, to) in (first..last).zip(&mut to[column * lines + first..]) {
-                *to = from[line * length + column];
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

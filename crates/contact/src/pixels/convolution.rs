@@ -1,15 +1,10 @@
 //! Products with a compliance that is the same everywhere, on a window of pixels.
 
-use crate::kernels::turn;
 use crate::layers::SurfaceCompliance;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use papilla_fft::{Grid, Line, Scratch, Wave};
 use std::f64::consts::TAU;
 use std::fmt;
 use std::sync::Arc;
-
-type C32 = Complex<f32>;
 
 /// Lengths of windows: a transform of each is fast.
 const LENGTHS: [usize; 17] =
@@ -30,46 +25,17 @@ pub(super) struct Cells<'a> {
     pub images: &'a [[u32; 2]],
 }
 
-/// Transforms along a window of one length.
-struct Plan {
-    length: usize,
-    forward: Arc<dyn RealToComplex<f32>>,
-    back: Arc<dyn ComplexToReal<f32>>,
-    across: [Arc<dyn Fft<f32>>; 2],
-}
-
 /// Transforms along windows of all lengths; made once, for any number of fingers.
-pub(super) struct Plans(Vec<Plan>);
-
-impl fmt::Debug for Plans {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_list().entries(self.0.iter().map(|plan| plan.length)).finish()
-    }
-}
+#[derive(Debug)]
+pub(super) struct Plans(Vec<Line>);
 
 impl Plans {
     pub(super) fn new() -> Self {
-        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
-        let plan = |length| Plan {
-            length,
-            forward: real.plan_fft_forward(length),
-            back: real.plan_fft_inverse(length),
-            across: [complex.plan_fft_forward(length), complex.plan_fft_inverse(length)],
-        };
-        Self(LENGTHS.map(plan).into())
+        Self(Line::all(&LENGTHS))
     }
 
-    fn of(&self, length: usize) -> Option<&Plan> {
-        self.0.iter().find(|plan| plan.length == length)
-    }
-
-    fn scratch_len(&self) -> usize {
-        let scratch = |p: &Plan| {
-            let lines = p.across.iter().map(|fft| fft.get_inplace_scratch_len()).max();
-            let along = p.forward.get_scratch_len().max(p.back.get_scratch_len());
-            along.max(lines.unwrap_or(0))
-        };
-        self.0.iter().map(scratch).max().unwrap_or(0)
+    fn of(&self, length: usize) -> Option<&Line> {
+        self.0.iter().find(|line| line.length() == length)
     }
 }
 
@@ -84,10 +50,9 @@ pub(super) struct Convolution {
     steps: [i32; 2],
     /// `[rows][columns]`.
     grid: Vec<f32>,
-    /// `[rows][columns / 2 + 1]`, and the same the other way round.
-    spectrum: Vec<C32>,
-    turned: Vec<C32>,
-    scratch: Vec<C32>,
+    /// `[columns / 2 + 1][rows]`.
+    waves: Vec<Wave>,
+    scratch: Scratch,
     /// `[columns / 2 + 1][rows]`: compliance over the number of pixels, mm/MPa.
     compliance: Vec<f32>,
 }
@@ -102,17 +67,15 @@ impl fmt::Debug for Convolution {
 impl Convolution {
     pub(super) fn new(plans: Arc<Plans>) -> Self {
         let half = LENGTH_MAX * (LENGTH_MAX / 2 + 1);
-        let zero = C32::new(0.0, 0.0);
         Self {
-            scratch: vec![zero; plans.scratch_len()],
+            scratch: Scratch::of(&plans.0),
             plans,
             rows: 0,
             columns: 0,
             pressed: 0,
             steps: [0; 2],
             grid: vec![0.0; LENGTH_MAX * LENGTH_MAX],
-            spectrum: vec![zero; half],
-            turned: vec![zero; half],
+            waves: vec![Wave::new(0.0, 0.0); half],
             compliance: vec![0.0; half],
         }
     }
@@ -212,31 +175,15 @@ impl Convolution {
 
     /// Pressure to displacement of the first `wanted` rows. The window is periodic.
     fn apply(&mut self, wanted: usize) {
-        let Self { plans, rows, columns, pressed, .. } = self;
-        let (rows, columns, half) = (*rows, *columns, *columns / 2 + 1);
-        let (Some(along), Some(across)) = (plans.of(columns), plans.of(rows)) else { return };
-        let Self { grid, spectrum, turned, scratch, compliance, .. } = self;
-        let filled = &mut grid[..*pressed * columns];
-        let [spectrum, turned] = [spectrum, turned].map(|v| &mut v[..rows * half]);
-        // Lengths are those of the plans, so nothing here can be refused.
-        for (row, waves) in filled.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
-            let _ = along.forward.process_with_scratch(row, waves, scratch);
-        }
-        spectrum[*pressed * half..].fill(C32::new(0.0, 0.0));
-        turn(spectrum, half, turned);
-        across.across[0].process_with_scratch(turned, scratch);
-        for (wave, compliance) in turned.iter_mut().zip(&*compliance) {
+        let Self { plans, rows, columns, pressed, grid, waves, scratch, compliance, .. } = self;
+        let (Some(along), Some(across)) = (plans.of(*columns), plans.of(*rows)) else { return };
+        let transform = Grid { rows: across, columns: along };
+        let waves = &mut waves[..*rows * transform.half()];
+        transform.forward(grid, *pressed, waves, scratch);
+        for (wave, compliance) in waves.iter_mut().zip(&*compliance) {
             *wave *= *compliance;
         }
-        across.across[1].process_with_scratch(turned, scratch);
-        turn(turned, rows, spectrum);
-        let wanted = &mut grid[..wanted * columns];
-        for (row, waves) in wanted.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
-            // Rounding leaves a trace of what is real.
-            waves[0].im = 0.0;
-            waves[half - 1].im = 0.0;
-            let _ = along.back.process_with_scratch(waves, row, scratch);
-        }
+        transform.back(waves, wanted, grid, scratch);
     }
 }
 

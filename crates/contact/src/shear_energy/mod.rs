@@ -14,17 +14,12 @@
 
 use crate::PA_PER_MPA;
 use crate::interface::{InterfaceResponse, Response};
-use crate::kernels::turn;
 use crate::model::ContactModel;
 use papilla_atlas::{Atlas, MAP_LEN, Patch, Raster};
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use papilla_fft::{Grid, Line, Scratch, Wave};
 use std::f64::consts::TAU;
 use std::fmt;
 use std::sync::Arc;
-
-type C32 = Complex<f32>;
 
 /// Pixels of the map along a side, and of the grid on which waves are.
 const MAP_SIDE: usize = 224;
@@ -48,9 +43,8 @@ pub struct InterfaceSkin {
     waves: Vec<([f32; 3], [f32; 8])>,
     /// Lame's constants below the interface, MPa.
     lame_mpa: [f32; 2],
-    forward: Arc<dyn RealToComplex<f32>>,
-    back: Arc<dyn ComplexToReal<f32>>,
-    across: [Arc<dyn Fft<f32>>; 2],
+    /// Along rows and columns of the grid.
+    line: Line,
 }
 
 impl fmt::Debug for InterfaceSkin {
@@ -71,17 +65,18 @@ impl InterfaceSkin {
         }
         let response = InterfaceResponse::new(layers);
         let period_mm = MAP_SIDE as f64 * f64::from(atlas.mm_per_px());
-        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
         Some(Self {
             tangents: tangents(model, &atlas.patch(skin.patch()).uv_px),
             skin,
             interface: Raster::new(atlas, Patch::Interface).indices().to_vec(),
             waves: (0..WAVES).map(|at| wave(at, period_mm, &response)).collect(),
             lame_mpa: below.lame_mpa().map(|v| v as f32),
-            forward: real.plan_fft_forward(SIDE),
-            back: real.plan_fft_inverse(SIDE),
-            across: [complex.plan_fft_forward(SIDE), complex.plan_fft_inverse(SIDE)],
+            line: Line::new(SIDE),
         })
+    }
+
+    fn transform(&self) -> Grid<'_> {
+        Grid { rows: &self.line, columns: &self.line }
     }
 }
 
@@ -142,11 +137,10 @@ pub struct ShearEnergy {
     vertices: Vec<f32>,
     map: Vec<f32>,
     grid: Vec<f32>,
-    spectrum: Vec<C32>,
-    turned: Vec<C32>,
-    scratch: Vec<C32>,
+    turned: Vec<Wave>,
+    scratch: Scratch,
     /// By wave: pressure, traction along columns and along rows.
-    loads: [Vec<C32>; 3],
+    loads: [Vec<Wave>; 3],
     /// Strain and traction at the interface, of pressure and of traction along the skin.
     of_pressure: Six<Vec<f32>>,
     of_shear: Six<Vec<f32>>,
@@ -162,19 +156,16 @@ impl ShearEnergy {
     /// A finger that nothing touches.
     #[must_use]
     pub fn new(of: Arc<InterfaceSkin>) -> Self {
-        let zero = C32::new(0.0, 0.0);
+        let zero = Wave::new(0.0, 0.0);
         let waves = || vec![zero; WAVES];
         let cells = || vec![0.0; CELLS];
-        let lines = of.across.iter().map(|fft| fft.get_inplace_scratch_len()).max().unwrap_or(0);
-        let along = of.forward.get_scratch_len().max(of.back.get_scratch_len());
         Self {
             vertices: vec![0.0; of.tangents.len()],
+            scratch: of.transform().scratch(),
             of,
             map: vec![0.0; MAP_LEN],
             grid: cells(),
-            spectrum: waves(),
             turned: waves(),
-            scratch: vec![zero; lines.max(along)],
             loads: [waves(), waves(), waves()],
             of_pressure: std::array::from_fn(|_| cells()),
             of_shear: std::array::from_fn(|_| cells()),
@@ -225,36 +216,24 @@ impl ShearEnergy {
 
     /// Means of the map over 2 x 2 pixels, as waves.
     fn transform(&mut self, load: usize, of: &InterfaceSkin, factor: f32) {
-        let Self { map, grid, spectrum, scratch, loads, .. } = self;
+        let Self { map, grid, scratch, loads, .. } = self;
         for (at, cell) in grid.iter_mut().enumerate() {
             let first = 2 * (at / SIDE) * MAP_SIDE + 2 * (at % SIDE);
             let rows = [first, first + MAP_SIDE].map(|i| map[i] + map[i + 1]);
             *cell = 0.25 * factor * (rows[0] + rows[1]);
         }
-        // Lengths are those of the plans, so nothing here can be refused.
-        for (row, waves) in grid.chunks_exact_mut(SIDE).zip(spectrum.chunks_exact_mut(HALF)) {
-            _ = of.forward.process_with_scratch(row, waves, scratch);
-        }
-        turn(spectrum, HALF, &mut loads[load]);
-        of.across[0].process_with_scratch(&mut loads[load], scratch);
+        of.transform().forward(grid, SIDE, &mut loads[load], scratch);
     }
 
     /// One of the six numbers at the interface, of pressure or of traction along the skin.
     fn field(&mut self, part: usize, of: &InterfaceSkin, is_shear: bool) {
-        let Self { spectrum, turned, scratch, loads: [p, x, y], of_pressure, of_shear, .. } = self;
+        let Self { turned, scratch, loads: [p, x, y], of_pressure, of_shear, .. } = self;
         let number = if is_shear { shear_number } else { pressure_number };
         for (at, (turned, wave)) in turned.iter_mut().zip(&of.waves).enumerate() {
             *turned = number(part, wave, [p[at], x[at], y[at]]);
         }
-        of.across[1].process_with_scratch(turned, scratch);
-        turn(turned, SIDE, spectrum);
         let out = if is_shear { &mut of_shear[part] } else { &mut of_pressure[part] };
-        for (row, waves) in out.chunks_exact_mut(SIDE).zip(spectrum.chunks_exact_mut(HALF)) {
-            // Rounding leaves a trace of what is real.
-            waves[0].im = 0.0;
-            waves[HALF - 1].im = 0.0;
-            _ = of.back.process_with_scratch(waves, row, scratch);
-        }
+        of.transform().back(turned, SIDE, out, scratch);
     }
 
     /// The change of energy density below the interface by cell, J/m3.
@@ -276,32 +255,32 @@ fn within(q: [f32; 3], limit_pa: f32) -> f32 {
 }
 
 /// A wave of one of the six numbers, of pressure.
-fn pressure_number(part: usize, wave: &([f32; 3], [f32; 8]), [p, _, _]: [C32; 3]) -> C32 {
+fn pressure_number(part: usize, wave: &([f32; 3], [f32; 8]), [p, _, _]: [Wave; 3]) -> Wave {
     let ([c, s, k], [_, along, _, shear, _, normal, _, _]) = *wave;
     let (strain, traction) = (-k * along, shear);
     match part {
         0 => p * (c * c * strain),
         1 => p * (s * s * strain),
         2 => p * (c * s * strain),
-        3 => C32::i() * p * (c * traction),
-        4 => C32::i() * p * (s * traction),
+        3 => Wave::i() * p * (c * traction),
+        4 => Wave::i() * p * (s * traction),
         _ => -p * normal,
     }
 }
 
 /// The same of traction along the skin.
-fn shear_number(part: usize, wave: &([f32; 3], [f32; 8]), [_, x, y]: [C32; 3]) -> C32 {
+fn shear_number(part: usize, wave: &([f32; 3], [f32; 8]), [_, x, y]: [Wave; 3]) -> Wave {
     let ([c, s, k], [along, _, shear, _, normal, _, moved, twist]) = *wave;
     let (q_k, q_t) = (x * c + y * s, y * c - x * s);
-    let strain = C32::i() * q_k * (k * along);
-    let slide = C32::i() * q_t * (0.5 * k * moved);
+    let strain = Wave::i() * q_k * (k * along);
+    let slide = Wave::i() * q_t * (0.5 * k * moved);
     match part {
         0 => strain * (c * c) - slide * (2.0 * c * s),
         1 => strain * (s * s) + slide * (2.0 * c * s),
         2 => strain * (c * s) + slide * (c * c - s * s),
         3 => q_k * (c * shear) - q_t * (s * twist),
         4 => q_k * (s * shear) + q_t * (c * twist),
-        _ => C32::i() * q_k * normal,
+        _ => Wave::i() * q_k * normal,
     }
 }
 
