@@ -8,6 +8,7 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 - `render`: a series of frames in one call, as arrays with units and files (`Series`)
 - `SpikeTrains`: when the touch units of a finger fire, as files
 - `sensors`: readings of an array of taxels to pressure, SED, rates and spikes
+- `devices`, `hjif`: what controllers and gloves take, and recorded touches as HJIF files
 - `meshes`: STL, OBJ, PLY and GLB as objects of a session
 - `frames`: poses of engines and robots to the finger's frame, forces back
 - `Atlas`: which point of the finger each pixel is; pressure maps from vertices or contact points
@@ -17,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import frames, meshes, sensors
+    from . import devices, frames, hjif, meshes, sensors
     from .aio import AsyncSession
     from .answer import Answer, Problem, Spikes, Summary, Touch
     from .atlas import Atlas, Contact
@@ -67,7 +68,9 @@ __all__ = [
     "Summary",
     "Touch",
     "Unreachable",
+    "devices",
     "frames",
+    "hjif",
     "indentation",
     "meshes",
     "post",
@@ -105,7 +108,7 @@ _NAMES = {
     "wire": ("SIDE_PX",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
-_MODULES = (*_NAMES, "frames", "meshes", "sensors")
+_MODULES = (*_NAMES, "devices", "frames", "hjif", "meshes", "sensors")
 
 if not TYPE_CHECKING:  # type checkers see the imports above, and refuse other names
 

@@ -4,7 +4,7 @@ import { PapillaError, missed, refusal, unreachable } from './error.js';
 import { Link, sessionUrl } from './link.js';
 import { Move } from './move.js';
 import { OPEN_MS, TIMEOUT_MS, Warnings, Watch } from './watch.js';
-import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, VERSION } from './wire.js';
+import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, VERSION, readSpikes } from './wire.js';
 
 /** @typedef {import('./types.js').HandHello} HandHello */
 /** @typedef {import('./types.js').Ready} Ready */
@@ -20,6 +20,7 @@ import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, V
  * @property {number} finger
  * @property {Touch} touch
  * @property {Float32Array | null} pressurePa as a map or at the vertices, if asked for
+ * @property {Float32Array | null} shearPa traction along the skin, x y z a vertex in the finger's frame, if asked for
  * @property {Float32Array | null} vertices what the map shows at the vertices, if asked for in its place
  * @property {Float32Array | null} map 224 x 224, 0 outside the answer's window, if asked for
  * @property {Float32Array | null} summary
@@ -27,6 +28,7 @@ import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, V
  * @property {Float32Array | null} points SED, J/m3
  * @property {Float32Array | null} pointRatesHz
  * @property {Float32Array | null} actuators
+ * @property {import('./wire.js').Spikes | null} spikes who fired since the answer before: the effect `spikes`
  * @property {Float32Array} sed the map, or the values at the vertices; throws NotCarriedError where there is neither
  * @property {Float32Array} ratesHz throws NotCarriedError where the session has none
  * @property {boolean} notTracked to `notTracked()`: all is zero
@@ -316,6 +318,8 @@ function read(data, view, ready) {
     return section ? new Float32Array(data, section.offset, section.bytes / 4) : null;
   };
   const flags = view.getUint8(46);
+  const spikes = ready.sections.find((s) => s.name === 'spikes');
+  const clientTimeUs = view.getUint32(16, true) + TWO_POW_32 * view.getUint32(20, true);
   // Answers of a hand are f32: the scale before the rates is 1.
   const rates = of('rates');
   return {
@@ -323,6 +327,7 @@ function read(data, view, ready) {
     finger: view.getUint8(47),
     touch: touchOf(of('touch') ?? new Float32Array(16)),
     pressurePa: of('pressure'),
+    shearPa: of('shear'),
     vertices: of('vertices'),
     map: mapOf(data, view, ready),
     summary: of('summary'),
@@ -330,6 +335,7 @@ function read(data, view, ready) {
     points: of('points'),
     pointRatesHz: of('point_rates'),
     actuators: of('actuators'),
+    spikes: spikes ? readSpikes(view, spikes.offset, spikes.bytes, clientTimeUs) : null,
     notTracked: (flags & FLAG.notTracked) !== 0,
     coarseClock: (flags & FLAG.coarseClock) !== 0,
     get sed() {

@@ -29,6 +29,18 @@ export interface Actuators {
   actuators: { at: Place; radius_mm?: number; gain?: number; threshold?: number; max?: number }[];
 }
 
+/** Simulated nerve fibres and their spikes: docs/reference/protocol-effects.md#spikes. */
+export interface SpikesWish {
+  seed?: number;
+  sa1_per_cm2?: number;
+  ra_per_cm2?: number;
+  pc_per_cm2?: number;
+  units?: { class: 'sa1' | 'ra' | 'pc'; at: Place; model?: number }[];
+  e_ref_kpa?: number;
+  noise?: boolean;
+  spikes_max?: number;
+}
+
 /** What a client asks for; `type` and `version` are added by the client. */
 export interface Hello {
   effects?: string[];
@@ -47,6 +59,7 @@ export interface Hello {
   actuators?: Actuators;
   afferents?: Afferents;
   relaxation?: Relaxation;
+  spikes?: SpikesWish;
 }
 
 /** A shape of scene files with its dimensions, or a closed mesh. */
@@ -74,6 +87,8 @@ export interface HandHello {
   force_target?: boolean;
   stiffness?: boolean;
   pressure?: 'map' | 'vertices';
+  /** Answers carry `shearPa`. */
+  shear?: boolean;
   /** Of gaps: a coefficient, and whether frames tell how things move. */
   friction?: number;
   velocity?: boolean;
@@ -86,6 +101,7 @@ export interface HandHello {
   actuators?: Actuators;
   afferents?: Afferents;
   relaxation?: Relaxation;
+  spikes?: SpikesWish;
 }
 
 /** Where an object is in a finger's frame: mm, and a unit quaternion x y z w. */
@@ -118,7 +134,7 @@ export interface Touch {
 }
 
 export interface Section {
-  name: 'touch' | 'pressure' | 'summary' | 'points' | 'point_rates' | 'actuators' | 'rates' | 'map' | 'vertices';
+  name: 'touch' | 'pressure' | 'shear' | 'summary' | 'points' | 'point_rates' | 'actuators' | 'spikes' | 'rates' | 'map' | 'vertices';
   offset: number;
   bytes: number;
 }
@@ -145,6 +161,8 @@ export interface Ready {
   /** Of the atlas, for what is laid out by them. */
   vertices: number;
   fingers: number;
+  /** Of the effect `spikes`, by number. */
+  units?: { class: 'sa1' | 'ra' | 'pc'; model: number; px: [number, number] }[];
   contact_us?: number;
   /** How pressure is found; missing where frames are pressure. */
   method?: ContactMethod;

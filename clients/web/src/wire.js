@@ -5,8 +5,11 @@ export const MAP_LEN = SIDE_PX * SIDE_PX;
 export const HEADER_BYTES = 48;
 /** Before the samples of the section `rates`: their scale, and zeros. */
 export const RATES_HEAD_BYTES = 16;
-/** Room for the largest answer: header, summary, 1024 points with their rates, 1024 actuators, f32 rates and an f32 map. */
-export const ANSWER_BYTES_MAX = HEADER_BYTES + 64 + 3 * 4096 + RATES_HEAD_BYTES + 2 * 4 * MAP_LEN;
+/** The most spikes that an answer carries, and its bytes of them: two numbers, then a unit and a time each. */
+const SPIKES_MAX = 16384;
+const SPIKES_BYTES_MAX = 8 + 4 * SPIKES_MAX;
+/** Room for the largest answer: header, summary, 1024 points with their rates, 1024 actuators, spikes, f32 rates and an f32 map. */
+export const ANSWER_BYTES_MAX = HEADER_BYTES + 64 + 3 * 4096 + SPIKES_BYTES_MAX + RATES_HEAD_BYTES + 2 * 4 * MAP_LEN;
 
 export const STATUS = /** @type {const} */ (['ok', 'superseded', 'late', 'error', 'stale']);
 export const SAMPLE_TYPES = /** @type {const} */ (['f32', 'f16', 'u16', 'u8']);
@@ -133,6 +136,31 @@ export class RequestFrame {
   }
 }
 
+/**
+ * Who fired since the answer before, in the order of time.
+ * @typedef {object} Spikes
+ * @property {Uint16Array} unit number of the unit in `ready.units`
+ * @property {Float64Array} timeUs when, by the client's clock
+ * @property {number} total spikes of the finger since the hello, those too that no answer carried; modulo 2^32
+ */
+
+/**
+ * The section `spikes` of an answer.
+ * @param {DataView} view @param {number} offset @param {number} bytes of the section @param {number} clientTimeUs
+ * @returns {Spikes}
+ */
+export function readSpikes(view, offset, bytes, clientTimeUs) {
+  const count = view.getUint32(offset + 4, true);
+  if (8 + 4 * count > bytes) throw new Error(`an answer names ${count} spikes in ${bytes} bytes`);
+  const unit = new Uint16Array(count);
+  const timeUs = new Float64Array(count);
+  for (let i = 0; i < count; i++) {
+    unit[i] = view.getUint16(offset + 8 + 4 * i, true);
+    timeUs[i] = clientTimeUs - view.getUint16(offset + 10 + 4 * i, true);
+  }
+  return { unit, timeUs, total: view.getUint32(offset, true) };
+}
+
 /** An answer was asked for what its session does not carry. */
 export class NotCarriedError extends Error {
   /** @param {string} member @param {string} advice */
@@ -184,6 +212,8 @@ export class Answer {
     this.pointRatesHz = null;
     /** One intensity an actuator of the effect `actuators`. @type {Float32Array | null} */
     this.actuators = null;
+    /** The effect `spikes`. @type {Spikes | null} */
+    this.spikes = null;
     this.clientTimeUs = 0;
     this.roundTripUs = 0;
     /** Receipt to sending, in the server. */
@@ -227,6 +257,7 @@ export class Answer {
     const rates = sections.find((s) => s.name === 'rates');
     return {
       summary: of('summary'), points: of('points'), pointRatesHz: of('point_rates'), actuators: of('actuators'),
+      spikes: sections.find((s) => s.name === 'spikes') ?? null,
       mapOffset: map ? map.offset : -1, ratesOffset: rates ? rates.offset : -1, rates: rates ? new Float32Array(MAP_LEN) : null,
     };
   }
@@ -272,6 +303,8 @@ export class Answer {
     this.points = views.points;
     this.pointRatesHz = views.pointRatesHz;
     this.actuators = views.actuators;
+    const { spikes } = views;
+    this.spikes = spikes ? readSpikes(this.#view, spikes.offset, spikes.bytes, this.clientTimeUs) : null;
     this.hasMap = views.mapOffset >= 0;
     this.rates = views.rates;
     // Only what the last answer wrote has to go.
