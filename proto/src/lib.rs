@@ -69,7 +69,7 @@ pub use map::{
     keep_inside, peak,
 };
 pub use message::{
-    ClientMessage, Hello, MessageError, Ready, Reconnect, ReconnectReason, Resumption,
+    ClientMessage, FingerTerms, Hello, MessageError, Ready, Reconnect, ReconnectReason, Resumption,
     SEALED_MAGIC, ServerMessage, SessionError, Warning,
 };
 pub use sample::{SampleError, SampleType};

@@ -9,8 +9,8 @@ use papilla_proto::contact::{
 use papilla_proto::sdf::{AnnouncedShape, Mesh, Sphere};
 use papilla_proto::spikes::{PlacedUnit, UnitClass};
 use papilla_proto::{
-    ClientMessage, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage,
-    Summary, Warning,
+    ClientMessage, FingerTerms, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType,
+    ServerMessage, Summary, Warning,
     effects::{
         Actuator, ActuatorInput, Afferents, ContactWindow, Drive, Layout, Moduli, OutOfRange,
         Place, PronyTerm, Relaxation, Section, SectionName, Tissue,
@@ -132,8 +132,8 @@ fn contact() -> impl Strategy<Value = Hello> {
             friction,
         },
     );
-    let finger = (0.5..2.0f64, 0.5..2.0f64)
-        .prop_map(|(width, stiffness)| AnnouncedFinger { width, stiffness });
+    let finger = (prop::option::of("[a-z]{1,8}"), 0.5..2.0f64, 0.5..2.0f64)
+        .prop_map(|(name, width, stiffness)| AnnouncedFinger { name, width, stiffness });
     let inputs = vec![Input::Pressure, Input::Gaps, Input::Objects];
     let methods = vec![
         ContactMethod::Springs,
@@ -209,6 +209,22 @@ proptest! {
             state: numbers.2.map(|_| Resumption::OtherTerms),
             vertices: offset,
             fingers: tier_number.into(),
+            finger_terms: numbers.3.map(|_| {
+                vec![FingerTerms {
+                    name: names[0].clone(),
+                    tier: names[1].clone(),
+                    tier_number,
+                    trained_on: numbers.2.map(|_| names[2].clone()),
+                    atlas_hash: names[2].clone(),
+                    vertices: offset,
+                    pressure_max_pa: scales.0,
+                    sed_scale_j_per_m3: scales.1,
+                    predicted_latency_us: numbers.1,
+                    method: numbers.2.map(|_| ContactMethod::Springs),
+                    expected_error: None,
+                    units: numbers.4.map(|_| Vec::new()),
+                }]
+            }),
             contact_us: Some(numbers.1),
             method: numbers.3.map(|_| ContactMethod::Pixels),
             expected_error: numbers.2.map(|states| {

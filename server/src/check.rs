@@ -1,6 +1,6 @@
 //! `papilla-server check`: is everything in order, without serving anything?
 
-use std::{fmt, net::TcpListener, time::Instant};
+use std::{fmt, fs, io, net::TcpListener, path::Path, time::Instant};
 
 use papilla_metrics::resident_bytes;
 use papilla_proto::contact::ContactMethod;
@@ -12,7 +12,10 @@ use serde_json::{Value, json};
 use crate::{
     StartError,
     config::Config,
-    core::catalogue::{Catalogue, Loading, Tier, assets::Assets, calibrate, golden},
+    core::{
+        catalogue::{Catalogue, Loading, Tier, assets::Assets, calibrate, golden},
+        fingers::{self, Bundle},
+    },
     descriptors::Descriptors,
     processor::Vectors,
     start::load_contact,
@@ -122,6 +125,7 @@ pub fn check(config: &Config) -> Report {
             let contact = load_contact(config, &assets, &catalogue);
             solves_contact = matches!(contact, Ok(Some(_)));
             look_at_contact(&mut report, contact);
+            solves_contact |= look_at_fingers(&mut report, config, &catalogue);
         }
         Err(error) => report.bad("models", error.exit_code(), &error),
     }
@@ -262,6 +266,100 @@ fn look_at_contact(report: &mut Report, contact: Result<Option<ContactAssets>, S
         }
         Err(error) => report.bad("contact", error.exit_code(), &error),
     }
+}
+
+/// Every folder of `--fingers`, whether it can be served or not; whether one has a contact model.
+fn look_at_fingers(report: &mut Report, config: &Config, default: &Catalogue) -> bool {
+    let Some(folder) = &config.fingers else { return false };
+    let names = match folders(folder) {
+        Ok(names) => names,
+        Err(source) => {
+            report.bad("fingers", 3, &StartError::Folder { folder: folder.clone(), source });
+            return false;
+        }
+    };
+    let most = config.max_loaded_fingers.get();
+    let detail = format!("{} in {}, {most} loaded at most", names.len(), folder.display());
+    let values = json!({"folders": names.len(), "loaded_max": most});
+    report.good("fingers", detail, values);
+    let mut solves_contact = false;
+    for name in &names {
+        let what = format!("finger {name}");
+        if !fingers::is_name(name) {
+            report.bad(
+                &what,
+                3,
+                &"no client can name it: a name has 1 to 64 letters, digits, - and _, and 'default' \
+                  is the finger of the models; rename the folder",
+            );
+            continue;
+        }
+        let before = resident_bytes();
+        let (loading, place) = (Loading::of_all(config), (&**name, 1));
+        let read = Bundle::read(&folder.join(name), place, loading, default, None, &|| false);
+        let bundle = match read {
+            Ok(Some(bundle)) => bundle,
+            Ok(None) => continue,
+            Err(error) => {
+                report.bad(&what, 3, &error);
+                continue;
+            }
+        };
+        solves_contact |= bundle.contact.is_some();
+        look_at_finger(report, &what, &bundle, before);
+    }
+    solves_contact
+}
+
+fn look_at_finger(report: &mut Report, what: &str, bundle: &Bundle, before: Option<u64>) {
+    let Bundle { catalogue, contact, files_bytes } = bundle;
+    let mut maps = Maps::default();
+    let mut sessions = Vec::new();
+    for (_, tier) in catalogue.offered().filter(|(_, tier)| !tier.on_demand) {
+        let Some(model) = tier.model() else { continue };
+        let Maps { pressure_pa, sed_j_per_m3, .. } = &mut maps;
+        match tier.warm_session(model.as_ref(), pressure_pa, sed_j_per_m3) {
+            Ok(session) => sessions.push(session),
+            Err(error) => return report.bad(what, 3, &error),
+        }
+    }
+    let grown = resident_bytes().zip(before).map(|(now, before)| now.saturating_sub(before));
+    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+    let takes = grown.map_or_else(String::new, |bytes| {
+        format!(", {} MiB here with all its models and one thread", mib(bytes))
+    });
+    let borrowed: Vec<&str> = catalogue
+        .offered()
+        .filter_map(|(_, tier)| tier.trained_on.as_ref().map(|_| tier.name.as_str()))
+        .collect();
+    let similarity = match borrowed.is_empty() {
+        true => String::new(),
+        false => format!("; by similarity alone: {}", borrowed.join(", ")),
+    };
+    let solves = if contact.is_some() { "contact" } else { "no contact model" };
+    let values = json!({
+        "atlas_hash": catalogue.atlas.hash(),
+        "contact": contact.is_some(),
+        "files_bytes": files_bytes,
+        "grown_bytes": grown,
+        "by_similarity": borrowed,
+    });
+    let (tiers, files) = (catalogue.names(), mib(*files_bytes));
+    let detail = format!("{tiers}; {solves}; {files} MiB of files{takes}{similarity}");
+    report.good(what, detail, values);
+}
+
+/// The names of the folders in a folder, in order.
+fn folders(folder: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.path().is_dir() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    names.sort_unstable();
+    Ok(names)
 }
 
 /// Bytes that clients can make the service hold, by construction.

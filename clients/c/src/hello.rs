@@ -1,7 +1,8 @@
 //! What a session asks for: the protocol's hello, as far as it has a meaning without a service.
 
 use papilla_proto::{
-    ClientMessage, ErrorCode, Hello, Problem, RuntimeEffect, SampleType, error::shortened,
+    ClientMessage, ErrorCode, Hello, Problem, RuntimeEffect, SampleType, contact::DEFAULT_FINGER,
+    error::shortened,
 };
 
 use crate::Model;
@@ -38,6 +39,17 @@ fn check_form(hello: &Hello) -> Result<(), Problem> {
         if is_there {
             let message = format!("'{member}' is of a service; nothing waits or travels here");
             return Err(Problem::new(ErrorCode::BadJson, message).at(member));
+        }
+    }
+    for (number, finger) in hello.fingers.iter().flatten().enumerate() {
+        if finger.name() != DEFAULT_FINGER {
+            let name = shortened(finger.name());
+            let message = format!(
+                "no finger '{name}': the library has the one finger whose folder was loaded; load \
+                 that of '{name}', and leave 'name' out"
+            );
+            let field = format!("fingers[{number}].name");
+            return Err(Problem::new(ErrorCode::BadContact, message).at(field));
         }
     }
     if hello.shear == Some(true) {

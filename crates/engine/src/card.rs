@@ -208,6 +208,10 @@ pub struct Index {
     /// Those of `models` that a service loads when a client first names them; no budget picks them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub on_demand: Vec<String>,
+    /// The finger whose presses trained those models whose atlas is not the one beside the index, by
+    /// its name: they serve this finger by similarity alone. None: there are no such models.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trained_on: Option<String>,
 }
 
 impl Index {
@@ -226,7 +230,7 @@ impl Index {
     }
 
     fn fault(&self) -> Option<String> {
-        let Self { default, models, on_demand } = self;
+        let Self { default, models, on_demand, .. } = self;
         if !models.contains(default) {
             return Some(format!("the default '{default}' is not in 'models'"));
         }

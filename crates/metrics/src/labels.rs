@@ -1,5 +1,7 @@
 //! The labels metrics carry.
 
+use std::borrow::Cow;
+
 use prometheus_client::encoding::{EncodeLabelSet, EncodeLabelValue, LabelValueEncoder};
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -138,10 +140,12 @@ impl Stage {
 }
 
 /// What the labels of a tier say.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct TierLabels<'a> {
-    /// Its name.
-    pub name: &'a str,
+    /// Its number among all tiers of all fingers.
+    pub number: usize,
+    /// Its name, after that of its finger if that is not the default.
+    pub name: Cow<'a, str>,
     /// Hash of its atlas.
     pub atlas_hash: &'a str,
     /// SHA-256 of its file.

@@ -28,9 +28,16 @@ use labels::{
 pub use labels::{Shed, Stage, TierLabels, Transport};
 pub use process::resident_bytes;
 
-/// Greatest number of tiers, counting every name since the start: handles have fixed places, so
-/// that the hot path takes no lock.
+/// Greatest number of tiers of a finger, counting every name since the start: handles have fixed
+/// places, so that the hot path takes no lock.
 pub const TIERS_MAX: usize = 64;
+
+/// Greatest number of fingers, the default one among them, counting every one since the start. The
+/// tiers of the finger at place `f` have the numbers from `f * TIERS_MAX`.
+pub const BUNDLES_MAX: usize = 64;
+
+/// The timers of a finger's tiers.
+type OfFinger = Box<[OnceLock<TierMetrics>; TIERS_MAX]>;
 
 /// Buckets of every stage, seconds: from a memory copy to a dropped session.
 ///
@@ -100,8 +107,8 @@ pub struct TransportMetrics {
 pub struct Metrics {
     registry: Registry,
     stages: Stages,
-    /// In the catalogue's order.
-    tiers: [OnceLock<TierMetrics>; TIERS_MAX],
+    /// By finger, then in its catalogue's order; of a finger that was never loaded there are none.
+    tiers: [OnceLock<OfFinger>; BUNDLES_MAX],
     /// Stands in for a tier without a place, which no catalogue has; in no registry.
     stray: TierMetrics,
     requests: Requests,
@@ -135,6 +142,8 @@ pub struct Metrics {
     pub sessions: Counter<u64, AtomicU64>,
     /// Open connections.
     pub connections_open: Gauge<i64, AtomicI64>,
+    /// Fingers that are loaded, the default one among them.
+    pub fingers_loaded: Gauge<i64, AtomicI64>,
 }
 
 impl Metrics {
@@ -193,6 +202,7 @@ impl Metrics {
             sessions_open: registered(registry, "sessions_open", "Open sessions"),
             sessions: registered(registry, "sessions", "Sessions ever opened"),
             connections_open: registered(registry, "connections_open", "Open connections"),
+            fingers_loaded: registered(registry, "fingers_loaded", "Fingers that are loaded"),
             registry: Registry::default(),
         };
         for stage in Stage::ALL {
@@ -214,13 +224,15 @@ impl Metrics {
         Arc::new(Self { registry: root, ..metrics })
     }
 
-    /// Gives every tier its timers, in this order, and lists the models on offer.
+    /// Gives every tier its timers, and lists the models on offer; of all fingers at once.
     pub fn name_tiers<'a>(&self, tiers: impl IntoIterator<Item = TierLabels<'a>>) {
         self.models.clear();
-        for (place, tier) in self.tiers.iter().zip(tiers) {
-            place.get_or_init(|| {
+        for tier in tiers {
+            let Some(finger) = self.tiers.get(tier.number / TIERS_MAX) else { continue };
+            let none = || Box::new(std::array::from_fn(|_| OnceLock::new()));
+            finger.get_or_init(none)[tier.number % TIERS_MAX].get_or_init(|| {
                 tier_metrics(|stage| {
-                    let labels = StageLabels { tier: tier.name.to_owned(), stage };
+                    let labels = StageLabels { tier: tier.name.clone().into_owned(), stage };
                     Timer(self.stages.get_or_create(&labels).clone())
                 })
             });
@@ -228,7 +240,7 @@ impl Metrics {
                 continue;
             }
             let labels = ModelLabels {
-                tier: tier.name.to_owned(),
+                tier: tier.name.into_owned(),
                 atlas_hash: tier.atlas_hash.to_owned(),
                 onnx_sha256: tier.onnx_sha256.to_owned(),
                 backend: tier.backend.to_owned(),
@@ -238,9 +250,11 @@ impl Metrics {
         }
     }
 
-    /// The timers of the tier at `place`.
-    pub fn tier(&self, place: usize) -> &TierMetrics {
-        self.tiers.get(place).and_then(OnceLock::get).unwrap_or(&self.stray)
+    /// The timers of the tier of this number.
+    pub fn tier(&self, number: usize) -> &TierMetrics {
+        let finger = self.tiers.get(number / TIERS_MAX).and_then(OnceLock::get);
+        let tier = finger.and_then(|tiers| tiers[number % TIERS_MAX].get());
+        tier.unwrap_or(&self.stray)
     }
 
     /// Takes note of a request.

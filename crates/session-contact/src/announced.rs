@@ -7,7 +7,7 @@ use papilla_proto::{
     sdf::Placement,
 };
 
-use super::unusable;
+use super::{Skin, unusable};
 
 /// Most triangles and heights of all shapes of a session: some 10 MB.
 const SIZE_MAX: usize = 32_768;
@@ -179,7 +179,7 @@ pub(crate) fn persons(hello: &Hello) -> Result<Vec<Person>, Problem> {
         return Err(unusable("fingers", message));
     }
     let person = |(index, finger): (usize, &AnnouncedFinger)| {
-        let AnnouncedFinger { width, stiffness } = *finger;
+        let &AnnouncedFinger { width, stiffness, .. } = finger;
         for (member, value) in [("width", width), ("stiffness", stiffness)] {
             if !(0.25..=4.0).contains(&value) {
                 let message = format!("{value} is no factor of a finger; 0.25 to 4 are taken");
@@ -189,6 +189,33 @@ pub(crate) fn persons(hello: &Hello) -> Result<Vec<Person>, Problem> {
         Ok(Person { width, stiffness })
     };
     list.iter().enumerate().map(person).collect()
+}
+
+/// A problem of the finger of this number: its message says which, where the hello names it.
+#[must_use]
+pub fn of_finger(hello: &Hello, number: usize, problem: Problem) -> Problem {
+    let named = hello.fingers.as_ref().and_then(|fingers| fingers.get(number)?.name.as_ref());
+    match named {
+        Some(name) => {
+            let message = format!("finger '{name}' (fingers[{number}]): {}", problem.message);
+            Problem { message, ..problem }
+        }
+        None => problem,
+    }
+}
+
+/// Two fingers whose samples at vertices are not as many.
+pub(crate) fn other_vertices(
+    hello: &Hello,
+    number: usize,
+    [first, other]: [Skin<'_>; 2],
+) -> Problem {
+    let [first, other] = [first, other].map(|skin| skin.atlas.vertex_count());
+    let message = format!(
+        "its atlas has {other} vertices, that of fingers[0] {first}, and samples at vertices were \
+         asked for: ask for the layout \"map\", or open a session for each of these fingers"
+    );
+    of_finger(hello, number, unusable(format!("fingers[{number}].name"), message))
 }
 
 /// Where samples are.

@@ -18,7 +18,7 @@ use papilla_proto::{
 };
 use sha2::{Digest, Sha256};
 
-use super::{Hand, method::Chosen};
+use super::method::Chosen;
 
 /// Frames that are timed, of which the median counts.
 const FRAMES: u32 = 15;
@@ -132,12 +132,6 @@ impl ContactAssets {
             Some(times) => times.shear_us,
             None => self.interface.as_ref().map(|_| SHEAR_EXPECTED_US),
         }
-    }
-
-    /// Time that a frame of this hand is expected to take, us; none if nothing is solved.
-    #[must_use]
-    pub fn us_of(&self, hand: &Hand) -> Option<u64> {
-        hand.method().and_then(|method| self.us_by(method))
     }
 }
 

@@ -47,6 +47,7 @@ use papilla_proto::{
     effects::{Section, SectionName},
 };
 
+pub use announced::of_finger;
 pub use assets::{AssetsError, ContactAssets, contact_errors};
 pub use finger::{Finger, Frame, Taken};
 pub use frame::FrameForm;
@@ -77,7 +78,8 @@ pub struct Skin<'a> {
 /// The fingers of one session.
 pub struct Hand {
     form: FrameForm,
-    method: Option<ContactMethod>,
+    /// Of each finger; none where frames are pressure.
+    methods: Vec<Option<ContactMethod>>,
     fingers: Vec<Arc<Mutex<Finger>>>,
     sections: Vec<Section>,
     warnings: Vec<Warning>,
@@ -109,42 +111,69 @@ impl Hand {
         skin: Skin<'_>,
         go_on: &dyn Fn() -> bool,
     ) -> Result<Self, Problem> {
-        let input = hello.input.unwrap_or_default();
-        announced::check_members(hello, input)?;
-        let chosen = Chosen::of(hello, input, skin)?;
-        let persons = announced::persons(hello)?;
-        let vertices = skin.atlas.vertex_count();
-        let (objects, mut warnings) = announced::objects(hello, input, go_on)?;
-        let form = FrameForm::of(hello, objects.len(), persons.len(), vertices);
-        let model = match (input, skin.model) {
-            (Input::Pressure, _) => None,
-            (_, None) => {
-                let message = "this service has no contact model, since its folder of models has no \
-                               finger.contact; put one there, start it with --contact FILE, or send \
-                               pressure";
-                return Err(unusable("input", message));
-            }
-            (_, Some(model)) => Some(model),
-        };
-        if let Some(model) = model {
-            model.require_atlas(skin.atlas.hash()).map_err(|e| unusable("input", e.to_string()))?;
-        }
-        let finger = |person| {
-            let solved = chosen.as_ref().zip(model);
-            let finger = Finger::new(hello, form, skin, solved, objects.clone(), person)?;
-            Ok(Arc::new(Mutex::new(finger)))
-        };
-        let fingers = persons.into_iter().map(finger).collect::<Result<_, Problem>>()?;
-        let sections = sections(hello, input, vertices);
-        warnings.extend(chosen.iter().filter_map(|chosen| chosen.warning.clone()));
-        let method = chosen.map(|chosen| chosen.method);
-        Ok(Self { form, method, fingers, sections, warnings })
+        Self::of_each(hello, skin, &[], go_on)
     }
 
-    /// How pressure is found; none where frames are pressure.
+    /// The same with a skin for each finger by its number; those without one of `skins` have the
+    /// skin `first`.
+    ///
+    /// # Errors
+    /// As [`Self::of_until`], and fingers whose answers would be laid out differently.
+    pub fn of_each(
+        hello: &Hello,
+        first: Skin<'_>,
+        skins: &[Skin<'_>],
+        go_on: &dyn Fn() -> bool,
+    ) -> Result<Self, Problem> {
+        let input = hello.input.unwrap_or_default();
+        announced::check_members(hello, input)?;
+        let skin_of = |number: usize| skins.get(number).copied().unwrap_or(first);
+        let choose = |number: usize| {
+            let chosen = Chosen::of(hello, input, skin_of(number));
+            chosen.map_err(|problem| announced::of_finger(hello, number, problem))
+        };
+        choose(0)?;
+        let persons = announced::persons(hello)?;
+        let (objects, mut warnings) = announced::objects(hello, input, go_on)?;
+        let laid_out = |skin: Skin<'_>| {
+            let vertices = skin.atlas.vertex_count();
+            let form = FrameForm::of(hello, objects.len(), persons.len(), vertices);
+            (form, sections(hello, input, vertices))
+        };
+        let (form, sections) = laid_out(skin_of(0));
+        let (mut fingers, mut methods) = (Vec::new(), Vec::new());
+        for (number, person) in persons.iter().enumerate() {
+            let skin = skin_of(number);
+            let of_finger = |problem| announced::of_finger(hello, number, problem);
+            let (its_form, its_sections) = laid_out(skin);
+            if its_form.size() != form.size() || its_sections != sections {
+                return Err(announced::other_vertices(hello, number, [skin_of(0), skin]));
+            }
+            let chosen = choose(number)?;
+            let model = model_of(input, skin).map_err(of_finger)?;
+            if let Some(warning) = chosen.iter().find_map(|chosen| chosen.warning.as_ref())
+                && !warnings.contains(warning)
+            {
+                warnings.push(warning.clone());
+            }
+            methods.push(chosen.as_ref().map(|chosen| chosen.method));
+            let solved = chosen.as_ref().zip(model);
+            let finger = Finger::new(hello, its_form, skin, solved, objects.clone(), *person);
+            fingers.push(Arc::new(Mutex::new(finger.map_err(of_finger)?)));
+        }
+        Ok(Self { form, methods, fingers, sections, warnings })
+    }
+
+    /// How pressure is found of the first finger; none where frames are pressure.
     #[must_use]
     pub fn method(&self) -> Option<ContactMethod> {
-        self.method
+        self.method_of(0)
+    }
+
+    /// How pressure is found of a finger by its number; none where frames are pressure.
+    #[must_use]
+    pub fn method_of(&self, number: usize) -> Option<ContactMethod> {
+        self.methods.get(number).copied().flatten()
     }
 
     /// What of the hello is met, but perhaps not as it was meant.
@@ -179,6 +208,21 @@ impl Hand {
             .map_or(0, |s| (s.offset + s.bytes) as usize - HEADER_LEN)
             .next_multiple_of(16)
     }
+}
+
+/// The contact model of a skin; none where frames are pressure.
+fn model_of(input: Input, skin: Skin<'_>) -> Result<Option<&Arc<ContactModel>>, Problem> {
+    if input == Input::Pressure {
+        return Ok(None);
+    }
+    let Some(model) = skin.model else {
+        let message = "this service has no contact model, since its folder of models has no \
+                       finger.contact; put one there, start it with --contact FILE, or send \
+                       pressure";
+        return Err(unusable("input", message));
+    };
+    model.require_atlas(skin.atlas.hash()).map_err(|e| unusable("input", e.to_string()))?;
+    Ok(Some(model))
 }
 
 fn sections(hello: &Hello, input: Input, vertices: usize) -> Vec<Section> {

@@ -19,6 +19,10 @@ pub(crate) struct Options {
     /// be given several times.
     #[arg(long, value_name = "NAME")]
     on_demand: Vec<String>,
+    /// The finger whose presses trained models whose atlas is not the one in the folder: they serve
+    /// the folder's finger by similarity alone, which the service then says in every answer.
+    #[arg(long, value_name = "FINGER")]
+    trained_on: Option<String>,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
@@ -51,9 +55,12 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         if model.info().name != *name {
             bail!("{} calls itself '{}'", path.display(), model.info().name);
         }
-        require_atlas("atlas.json", atlas.hash(), model.info())?;
+        if options.trained_on.is_none() {
+            require_atlas("atlas.json", atlas.hash(), model.info())?;
+        }
     }
-    let index = Index { default: options.default.clone(), models, on_demand };
+    let (default, trained_on) = (options.default.clone(), options.trained_on.clone());
+    let index = Index { default, models, on_demand, trained_on };
     let text = serde_json::to_string_pretty(&index)? + "\n";
     let path = options.folder.join("index.json");
     write(&path, text.as_bytes())?;

@@ -70,19 +70,33 @@ pub struct AnnouncedObject {
     pub friction: Option<f64>,
 }
 
+/// The finger that a hello means where it names none.
+pub const DEFAULT_FINGER: &str = "default";
+
 /// A finger of the hand.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnnouncedFinger {
-    /// Width over that of the reference finger.
+    /// Whose it is: the name of a finger that the service has; none: [`DEFAULT_FINGER`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Width over that of the finger that is named.
     pub width: f64,
-    /// Stiffness of its tissue over that of the reference finger.
+    /// Stiffness of its tissue over that of the finger that is named.
     pub stiffness: f64,
 }
 
 impl Default for AnnouncedFinger {
     fn default() -> Self {
-        Self { width: 1.0, stiffness: 1.0 }
+        Self { name: None, width: 1.0, stiffness: 1.0 }
+    }
+}
+
+impl AnnouncedFinger {
+    /// The name of the finger that is meant.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.name.as_deref().unwrap_or(DEFAULT_FINGER)
     }
 }
 

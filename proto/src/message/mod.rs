@@ -166,7 +166,7 @@ pub struct Hello {
     /// The objects whose poses frames hold. Due with them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objects: Option<Vec<AnnouncedObject>>,
-    /// The fingers; none: one, the reference finger.
+    /// The fingers; none: one, the service's default finger.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingers: Option<Vec<AnnouncedFinger>>,
     /// How pressure is found of objects or gaps; none: by the most accurate method that can
@@ -334,6 +334,10 @@ pub struct Ready {
     pub vertices: u32,
     /// Fingers of the session.
     pub fingers: u32,
+    /// The terms of each finger by its number, where the hello names any; what this message says
+    /// beside them is of the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finger_terms: Option<Vec<FingerTerms>>,
     /// Time of the contact solve that is expected, us; within `predicted_latency_us`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_us: Option<u64>,
@@ -346,6 +350,40 @@ pub struct Ready {
     /// What of the hello is met, but perhaps not as it was meant; clients show each once.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Warning>,
+}
+
+/// On what terms one finger of a session is rendered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FingerTerms {
+    /// The finger's name.
+    pub name: String,
+    /// The tier that will render it.
+    pub tier: String,
+    /// Number that its answers name the tier by.
+    pub tier_number: u16,
+    /// The finger whose presses trained that tier, if another: SED is then by similarity alone,
+    /// and answers are flagged [`UNFAMILIAR`](crate::flags::UNFAMILIAR).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trained_on: Option<String>,
+    /// Hash of its atlas.
+    pub atlas_hash: String,
+    /// Vertices of its atlas.
+    pub vertices: u32,
+    /// Greatest pressure its tier takes, Pa.
+    pub pressure_max_pa: f32,
+    /// As [`Ready::sed_scale_j_per_m3`].
+    pub sed_scale_j_per_m3: f32,
+    /// Time from receipt to answer that is expected of its frames on an idle machine, us.
+    pub predicted_latency_us: u64,
+    /// How its pressure is found; none where frames are pressure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<ContactMethod>,
+    /// What that method errs with this finger; none if nobody measured it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected_error: Option<MethodError>,
+    /// Its units of the effect `spikes`, by number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Vec<PlacedUnit>>,
 }
 
 /// A member of the hello that is met, but perhaps not as it was meant.

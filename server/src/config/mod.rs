@@ -95,7 +95,13 @@ pub struct Config {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<PathBuf>,
 
-    /// Reload when the folder of models changes.
+    /// Folder of fingers that hellos name beside the default one, which is that of the models: each a
+    /// folder like that of models, with finger.toml, loaded when a client first names it.
+    #[arg(long, env = "PAPILLA_FINGERS", value_name = "DIR")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fingers: Option<PathBuf>,
+
+    /// Reload when the folder of models changes, or that of fingers.
     #[arg(long, env = "PAPILLA_WATCH_MODELS")]
     pub watch_models: bool,
 
@@ -185,6 +191,11 @@ pub struct Config {
     #[arg(long, env = "PAPILLA_MAX_FINGERS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_fingers: NonZeroUsize,
 
+    /// Greatest number of fingers of --fingers that are loaded; a further one is refused; 1 to 63. Each
+    /// may have 256 MiB of files.
+    #[arg(long, env = "PAPILLA_MAX_LOADED_FINGERS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::LOADED_FINGERS), default_value = "8", value_name = "N")]
+    pub max_loaded_fingers: NonZeroUsize,
+
     /// Greatest number of posted maps that wait or run; further ones are answered 503; 1 to 10000.
     #[arg(long, env = "PAPILLA_MAX_REQUESTS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_requests: NonZeroUsize,
@@ -233,6 +244,7 @@ impl Default for Config {
             allow_anyone: false,
             models: None,
             contact: None,
+            fingers: None,
             watch_models: false,
             threads: None,
             real_time: false,
@@ -251,6 +263,7 @@ impl Default for Config {
             state_keys: None,
             max_sessions: n(64),
             max_fingers: n(64),
+            max_loaded_fingers: n(8),
             max_requests: n(64),
             max_connections: n(256),
             max_body_bytes: 2 << 20,

@@ -2,10 +2,14 @@
 
 use std::{ops::RangeInclusive, str::FromStr};
 
+use papilla_metrics::BUNDLES_MAX;
+
 use super::{Config, SettingError};
 
 /// Each place for a session or a posted map takes some MiB.
 pub(super) const PLACES: RangeInclusive<u64> = 1..=10_000;
+/// With the default finger all places that there are for fingers.
+pub(super) const LOADED_FINGERS: RangeInclusive<u64> = 1..=BUNDLES_MAX as u64 - 1;
 /// More than a system gives one process as file descriptors unasked.
 pub(super) const CONNECTIONS: RangeInclusive<u64> = 1..=100_000;
 pub(super) const THREADS: RangeInclusive<u64> = 1..=1024;
@@ -42,6 +46,7 @@ pub(super) fn check(config: &Config) -> Result<(), SettingError> {
     for (field, value, range) in [
         ("max_sessions", count(config.max_sessions.get()), PLACES),
         ("max_fingers", count(config.max_fingers.get()), PLACES),
+        ("max_loaded_fingers", count(config.max_loaded_fingers.get()), LOADED_FINGERS),
         ("max_requests", count(config.max_requests.get()), PLACES),
         ("max_connections", count(config.max_connections.get()), CONNECTIONS),
         ("threads", count(config.threads.map_or(1, |threads| threads.get())), THREADS),

@@ -41,9 +41,17 @@ impl Config {
             }
             _ => {}
         }
-        if self.watch_models && self.models.is_none() {
-            let reason = "the models in the binary cannot change; name a folder with --models";
+        if self.watch_models && self.models.is_none() && self.fingers.is_none() {
+            let reason = "the models in the binary cannot change; name a folder with --models, or \
+                          with --fingers";
             return refuse("watch_models", reason.to_owned());
+        }
+        if let Some(folder) = self.fingers.as_ref().filter(|folder| !folder.is_dir()) {
+            let reason = format!(
+                "{} is no folder; it holds a folder for each finger, which is called as the finger",
+                folder.display()
+            );
+            return refuse("fingers", reason);
         }
         if let Some(folder) = self.xr_dir.as_ref().filter(|dir| !dir.join("index.html").is_file()) {
             let reason = format!(

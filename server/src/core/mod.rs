@@ -2,7 +2,8 @@
 //!
 //! `scheduler` takes jobs to the inference threads, by turns of sessions. `desk` works out hellos on
 //! threads of its own. `catalogue` holds the tiers, the atlas and the
-//! replay; `reload` replaces it while the service runs. `buffers` are used again from frame to frame.
+//! replay of one finger, `fingers` are those that clients can name; `reload` replaces and loads them
+//! while the service runs. `buffers` are used again from frame to frame.
 //! `latency` and `metrics` keep the times.
 
 pub(crate) mod buffers;
@@ -10,6 +11,7 @@ pub(crate) mod cache;
 pub(crate) mod catalogue;
 pub(crate) mod desk;
 pub(crate) mod digest;
+pub(crate) mod fingers;
 pub(crate) mod latency;
 pub(crate) mod reload;
 pub(crate) mod scheduler;

@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use papilla_metrics::TIERS_MAX;
+use papilla_metrics::{BUNDLES_MAX, TIERS_MAX};
 use tokio::time::{Instant, sleep};
 
 use crate::{drain::begun, transport::app::App};
@@ -14,25 +14,32 @@ use crate::{drain::begun, transport::app::App};
 const LOOK: Duration = Duration::from_secs(1);
 const LOOKS: usize = 10;
 
-/// What was asked for at a look: maps of each tier, time of contact solves. A look allocates nothing.
+/// What was asked for at a look: maps of each tier by its number, time of contact solves. A look
+/// allocates nothing.
 struct Asked {
-    maps: [u64; TIERS_MAX],
+    maps: Box<[u64]>,
     contact_us: u64,
 }
 
 impl Asked {
-    fn now(app: &App) -> Self {
-        let of_tier = |place| app.metrics.tier(place).asked.load(Ordering::Relaxed);
-        let maps = std::array::from_fn(of_tier);
-        Self { maps, contact_us: app.metrics.contact.asked_us.load(Ordering::Relaxed) }
+    fn none() -> Self {
+        Self { maps: vec![0; BUNDLES_MAX * TIERS_MAX].into_boxed_slice(), contact_us: 0 }
     }
 
-    /// Thread time that what came since asks for, s, as long as each takes here now.
-    fn seconds_since(&self, before: &Self, app: &App) -> f64 {
-        let (catalogue, mut us) = (app.catalogue(), self.contact_us - before.contact_us);
-        for tier in 0..catalogue.tiers.len().min(TIERS_MAX) {
-            let new = self.maps[tier] - before.maps[tier];
-            us += new * catalogue.predicted_latency_us(tier);
+    /// Takes note of what was asked for until now; thread time that what came since the last look
+    /// asks for, s, as long as each takes here now.
+    fn look(&mut self, app: &App) -> f64 {
+        let contact_us = app.metrics.contact.asked_us.load(Ordering::Relaxed);
+        let mut us = contact_us - std::mem::replace(&mut self.contact_us, contact_us);
+        let mut finger = 0;
+        while let Some(catalogue) = app.reloader.catalogue_at(finger) {
+            for place in 0..catalogue.tiers.len().min(TIERS_MAX) {
+                let number = catalogue.tier_number(place);
+                let asked = app.metrics.tier(number).asked.load(Ordering::Relaxed);
+                let new = asked - std::mem::replace(&mut self.maps[number], asked);
+                us += new * catalogue.predicted_latency_us(place);
+            }
+            finger += 1;
         }
         us as f64 * 1e-6
     }
@@ -40,7 +47,8 @@ impl Asked {
 
 /// Keeps the figure up to date until the drain begins.
 pub(super) async fn until_drain(app: Arc<App>, threads: usize) {
-    let (mut before, mut looked) = (Asked::now(&app), Instant::now());
+    // Nothing was asked for before the start.
+    let (mut asked, mut looked) = (Asked::none(), Instant::now());
     let mut shares = [0.0; LOOKS];
     for look in 0.. {
         // Held no longer than the wait: a drain waits for whoever holds one.
@@ -49,10 +57,9 @@ pub(super) async fn until_drain(app: Arc<App>, threads: usize) {
             () = begun(&mut drain) => return,
             () = sleep(LOOK) => drop(drain),
         }
-        let asked = Asked::now(&app);
         let there_is_s = looked.elapsed().as_secs_f64() * threads as f64;
-        shares[look % LOOKS] = asked.seconds_since(&before, &app) / there_is_s;
+        shares[look % LOOKS] = asked.look(&app) / there_is_s;
         app.metrics.load.set(shares.iter().sum::<f64>() / LOOKS as f64);
-        (before, looked) = (asked, Instant::now());
+        looked = Instant::now();
     }
 }

@@ -31,7 +31,7 @@ use crate::{
             calibrate, golden,
         },
         desk::Desk,
-        reload,
+        fingers, reload,
         scheduler::Pool,
     },
     priority::{Priorities, RealTime, Role},
@@ -103,8 +103,9 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let parts = (gate, moves, desk);
     let app = App::new(&config, catalogue, metrics, &pool, parts, drain, Arc::clone(&progress));
     let app = Arc::new(app);
-    if let (true, Some(folder)) = (config.watch_models, &config.models) {
-        let (reloader, watched) = (Arc::clone(&app.reloader), folder.clone());
+    let watched = [config.models.as_deref(), config.fingers.as_deref()].into_iter().flatten();
+    for folder in watched.filter(|_| config.watch_models) {
+        let (reloader, watched) = (Arc::clone(&app.reloader), folder.to_owned());
         // What watches has a thread, which is not to have the priority of those that read.
         let watching = spawn_blocking(move || reload::watch(reloader, &watched));
         watching.await.map_err(|_| StartError::WorkerPanicked)?.map_err(StartError::Thread)?;
@@ -134,6 +135,10 @@ fn load(
     priorities: &Priorities,
 ) -> Result<(Arc<Catalogue>, Pool), StartError> {
     let loading = Loading::of_default(config);
+    if let Some(folder) = &config.fingers {
+        let names = fingers::names(folder)?;
+        tracing::info!(folder = %folder.display(), fingers = names.join(", "), "fingers to be named");
+    }
     let catalogue = Catalogue::load_noting(assets, loading, None, &mut |step| match step {
         Step::Listed(names) => progress.enter(Stage::Loading, names.to_vec()),
         Step::Loaded(name) => progress.done(name),

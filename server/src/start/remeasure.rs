@@ -18,8 +18,8 @@ const ROUNDS: usize = 3;
 /// Measures one tier after the other, each time while nobody is served, until the drain begins.
 pub(super) async fn until_drain(app: Arc<App>) {
     for round in 0.. {
-        let mut place = 0;
-        while place < app.catalogue().tiers.len() {
+        let (mut finger, mut place) = (0, 0);
+        while let Some(catalogue) = app.reloader.catalogue_at(finger) {
             // Held no longer than the wait: a drain waits for whoever holds one.
             let mut drain = app.drain.subscribe();
             tokio::select! {
@@ -29,9 +29,11 @@ pub(super) async fn until_drain(app: Arc<App>) {
             if !app.is_idle() {
                 continue;
             }
-            let catalogue = app.catalogue();
-            let latency = &catalogue.tiers[place].latency;
-            if round >= ROUNDS && !latency.has_been_faster() {
+            let Some(tier) = catalogue.tiers.get(place) else {
+                (finger, place) = (finger + 1, 0);
+                continue;
+            };
+            if round >= ROUNDS && !tier.latency.has_been_faster() {
                 place += 1;
                 continue;
             }

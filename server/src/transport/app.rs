@@ -1,12 +1,13 @@
 //! What every route and session shares.
 
 use std::{
+    path::PathBuf,
     sync::Arc,
     sync::atomic::{AtomicU64, Ordering},
 };
 
 use papilla_metrics::{Metrics, Shed};
-use papilla_proto::{ErrorCode, Problem};
+use papilla_proto::{ErrorCode, Problem, contact::DEFAULT_FINGER, error::shortened};
 use papilla_session_contact::ContactAssets;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SetOnce, watch};
 
@@ -19,14 +20,21 @@ use crate::{
     config::{Config, Timeouts},
     core::{
         buffers::Store,
-        catalogue::Catalogue,
+        catalogue::{Catalogue, places},
         desk::Desk,
+        fingers::Loaded,
         reload::Reloader,
         scheduler::{Pool, PoolHandle},
     },
     problem,
     progress::Progress,
 };
+
+/// Where the fingers beside the default one are, and how many of them may be loaded.
+pub(crate) struct Fingers {
+    pub(crate) folder: Option<PathBuf>,
+    pub(crate) most: usize,
+}
 
 /// The shared state.
 pub(crate) struct App {
@@ -44,13 +52,15 @@ pub(crate) struct App {
     pub(crate) progress: Arc<Progress>,
     /// Memory of sessions that are over.
     pub(crate) store: Store,
-    /// The contact model, if there is one, once that is known.
-    contact: SetOnce<Option<ContactAssets>>,
+    /// The default finger's contact model, if there is one, once that is known.
+    contact: SetOnce<Option<Arc<ContactAssets>>>,
+    /// The fingers beside the default one.
+    pub(crate) fingers: Fingers,
     /// Where hellos are worked out.
     pub(crate) desk: Desk<Option<Key>>,
     /// Accounts of clients that post maps.
     pub(crate) posters: Posters,
-    fingers: Arc<Semaphore>,
+    places_for_fingers: Arc<Semaphore>,
     sessions: Arc<Semaphore>,
     requests: Arc<Semaphore>,
     requests_max: usize,
@@ -74,6 +84,10 @@ impl App {
             gate,
             moves,
             desk,
+            fingers: Fingers {
+                folder: config.fingers.clone(),
+                most: config.max_loaded_fingers.get(),
+            },
             body_max: config.max_body_bytes,
             pool: pool.handle(&metrics),
             metrics,
@@ -83,7 +97,7 @@ impl App {
             store: Store::new(config.max_sessions.get()),
             contact: SetOnce::new(),
             posters: Posters::default(),
-            fingers: Arc::new(Semaphore::new(config.max_fingers.get())),
+            places_for_fingers: Arc::new(Semaphore::new(config.max_fingers.get())),
             sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
             requests: Arc::new(Semaphore::new(config.max_requests.get())),
             requests_max: config.max_requests.get(),
@@ -94,12 +108,36 @@ impl App {
     /// From here on it is known whether there is a contact model.
     pub(crate) fn set_contact(&self, contact: Option<ContactAssets>) {
         // Err: it is known already.
-        let _ = self.contact.set(contact);
+        let _ = self.contact.set(contact.map(Arc::new));
     }
 
-    /// The contact model; none if there is none, or it is not loaded yet.
-    pub(crate) fn contact(&self) -> Option<&ContactAssets> {
+    /// The default finger's contact model; none if there is none, or it is not loaded yet.
+    pub(crate) fn contact(&self) -> Option<&Arc<ContactAssets>> {
         self.contact.get().and_then(Option::as_ref)
+    }
+
+    /// A finger as it is served now.
+    ///
+    /// # Errors
+    /// There is none of this name, or it is not loaded.
+    pub(crate) fn finger(&self, name: &str) -> Result<Loaded, Problem> {
+        if name == DEFAULT_FINGER {
+            return Ok(Loaded { catalogue: self.catalogue(), contact: self.contact().cloned() });
+        }
+        self.reloader.finger(name).map(|named| named.loaded).ok_or_else(|| {
+            // Its first use came to nothing, or a reload came between.
+            let name = shortened(name);
+            let message = format!("finger '{name}' is not loaded; try again in a moment");
+            Problem::new(ErrorCode::Overloaded, message)
+        })
+    }
+
+    /// The name of the tier of this number; empty if there is none.
+    pub(crate) fn tier_name(&self, number: usize) -> String {
+        let (finger, place) = places(number);
+        let catalogue = self.reloader.catalogue_at(finger);
+        let tier = catalogue.as_ref().and_then(|catalogue| catalogue.tiers.get(place));
+        tier.map(|tier| tier.name.clone()).unwrap_or_default()
     }
 
     /// Whether it is known by now if there is a contact model.
@@ -154,7 +192,7 @@ impl App {
     /// Too few are left.
     pub(crate) fn admit_fingers(&self, count: usize) -> Result<OwnedSemaphorePermit, Problem> {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
-        Arc::clone(&self.fingers).try_acquire_many_owned(count).map_err(|_| {
+        Arc::clone(&self.places_for_fingers).try_acquire_many_owned(count).map_err(|_| {
             self.metrics.shed(Shed::Sessions);
             let message = "places for fingers are taken (max_fingers); try again in a moment";
             Problem::new(ErrorCode::Overloaded, message).at("fingers")

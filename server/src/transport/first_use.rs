@@ -1,47 +1,96 @@
-//! Waiting for a tier whose model is loaded when a client first names it.
+//! Waiting for a tier, or a finger, that is loaded when a client first names it.
 
 use std::{sync::Arc, time::Duration};
 
 use papilla_metrics::Shed;
-use papilla_proto::{ErrorCode, Problem};
+use papilla_proto::{ErrorCode, Problem, contact::DEFAULT_FINGER, error::shortened};
 use tokio::time::timeout;
 
 use super::{app::App, gate::Key};
-use crate::{core::desk::NoResult, problem};
+use crate::{
+    core::{
+        catalogue::places,
+        desk::NoResult,
+        reload::{Reloader, Turn},
+    },
+    problem,
+};
 
-/// Waits until the tier at `place` is loaded, no longer than `wait_max`. The desk loads it, once for
-/// all who wait: it goes on if whoever named it first leaves.
+/// Waits until the finger of this name is loaded, no longer than `wait_max`; the desk loads it, as
+/// [`wait`] has it.
+///
+/// # Errors
+/// There is none, too many are loaded, it is unusable, or it is not loaded in time; then it is still
+/// being loaded, and the problem says to come again.
+pub(crate) async fn wait_for_finger(
+    app: &Arc<App>,
+    name: &str,
+    client: Option<&Key>,
+    wait_max: Duration,
+) -> Result<(), Problem> {
+    if name == DEFAULT_FINGER || app.reloader.finger(name).is_some() {
+        return Ok(());
+    }
+    if let Some(problem) = app.reloader.finger_failed_lately(name) {
+        return Err(problem);
+    }
+    let owned = name.to_owned();
+    let load = move |reloader: &Reloader, turn: &Turn| reloader.load_finger(turn, &owned);
+    let what = format!("finger '{}'", shortened(name));
+    at_desk(app, &what, client, wait_max, load).await
+}
+
+/// Waits until the tier of this number is loaded, no longer than `wait_max`. The desk loads it, once
+/// for all who wait: it goes on if whoever named it first leaves.
 ///
 /// # Errors
 /// The model is unusable, or not loaded in time; then it is still being loaded, and the problem says
 /// to come again.
 pub(crate) async fn wait(
     app: &Arc<App>,
-    place: usize,
+    number: usize,
     client: Option<&Key>,
     wait_max: Duration,
 ) -> Result<(), Problem> {
-    let catalogue = app.catalogue();
-    let Some(tier) = catalogue.tiers.get(place).filter(|tier| !tier.is_loaded()) else {
+    let (finger, place) = places(number);
+    let catalogue = app.reloader.catalogue_at(finger);
+    let tier = catalogue.as_ref().and_then(|catalogue| catalogue.tiers.get(place));
+    let Some(tier) = tier.filter(|tier| !tier.is_loaded()) else {
         return Ok(());
     };
     if let Some(problem) = tier.held.failed_lately() {
         return Err(problem);
     }
+    let load = move |reloader: &Reloader, turn: &Turn| reloader.load_first(turn, number);
+    let what = format!("tier {}", tier.name);
+    at_desk(app, &what, client, wait_max, load).await.map_err(|problem| match problem.field {
+        None => problem.at("tier"),
+        Some(_) => problem,
+    })
+}
+
+/// Has the desk load something, once it is its turn, and waits for that no longer than `wait_max`.
+async fn at_desk(
+    app: &Arc<App>,
+    what: &str,
+    client: Option<&Key>,
+    wait_max: Duration,
+    load: impl FnOnce(&Reloader, &Turn) -> Result<(), Problem> + Send + 'static,
+) -> Result<(), Problem> {
     let loading = async {
         // Those who come meanwhile wait here, and then find it loaded.
         let turn = app.reloader.begin().await;
         let (to_load, client) = (Arc::clone(app), client.cloned());
         let work = async move {
             let reloader = Arc::clone(&to_load.reloader);
-            to_load.desk.work(client, move |_| reloader.load_first(&turn, place)).await
+            to_load.desk.work(client, move |_| load(&reloader, &turn)).await
         };
         // A task of its own: it outlives whoever waits for it.
         tokio::spawn(work).await
     };
     let busy = |message: String| {
         app.metrics.shed(Shed::Hellos);
-        Problem::new(ErrorCode::Overloaded, message).at("tier")
+        Problem::new(ErrorCode::Overloaded, message)
     };
     match timeout(wait_max, loading).await {
         Ok(Ok(Ok(result))) => result,
@@ -49,12 +98,11 @@ pub(crate) async fn wait(
             Err(busy("too much waits to be worked out; try again in a moment".to_owned()))
         }
         Ok(Ok(Err(NoResult::Broken)) | Err(_)) => {
-            Err(problem::internal("the tier cannot be loaded", &tier.name))
+            Err(problem::internal("it cannot be loaded", &what))
         }
         Err(_) => Err(busy(format!(
-            "tier {} is loaded at its first use, which takes longer than {wait_max:?}; try again \
-             in a moment",
-            tier.name
+            "{what} is loaded at its first use, which takes longer than {wait_max:?}; try again in a \
+             moment"
         ))),
     }
 }

@@ -11,6 +11,8 @@ const OFFERED: [Output; 4] =
 /// The parameters of `POST /v1/sed`.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Query {
+    /// Finger by name.
+    pub(crate) finger: Option<String>,
     /// Tier by name.
     pub(crate) tier: Option<String>,
     /// Time the map may spend in the server, us.
@@ -32,6 +34,7 @@ impl Query {
         let mut parsed = Self::default();
         for (name, value) in form_urlencoded::parse(query.as_bytes()) {
             let twice = match &*name {
+                "finger" => parsed.finger.replace(value.into_owned()).is_some(),
                 "tier" => parsed.tier.replace(value.into_owned()).is_some(),
                 "budget_us" => {
                     let budget = value.parse().map_err(|_| {
@@ -49,7 +52,8 @@ impl Query {
                     parsed.pressure_max_pa.replace(pressure).is_some()
                 }
                 _ => {
-                    let (name, known) = (shortened(&name), "tier, budget_us and pressure_max_pa");
+                    let known = "finger, tier, budget_us and pressure_max_pa";
+                    let name = shortened(&name);
                     return Err(bad_query(&name, format!("no parameter '{name}'; known: {known}")));
                 }
             };

@@ -23,7 +23,7 @@ use super::{
     answer::{Shared, refusal::refused},
     app::App,
     gate::{Admitted, RouteAccess, TokenInQuery, cors},
-    http::{admin, atlas, effects, info, page, replay, sed, xr},
+    http::{admin, atlas, effects, finger, info, page, replay, sed, xr},
     oip, session,
 };
 use crate::telemetry;
@@ -40,6 +40,7 @@ fn routes() -> Vec<(Method, &'static str, MethodRouter<Arc<App>>)> {
         (g.clone(), "/metrics", get(info::metrics)),
         (g.clone(), "/openapi.json", get(page::openapi)),
         (g.clone(), "/v1/tiers", get(info::tiers)),
+        (g.clone(), "/v1/fingers", get(finger::list)),
         (g.clone(), "/v1/models", get(info::models)),
         (g.clone(), "/v1/effects", get(effects::list)),
         (g.clone(), "/v1/atlas", get(atlas::json)),

@@ -9,6 +9,7 @@ mod clocks;
 mod contact;
 mod drain;
 mod effects;
+mod fingers;
 mod first_use;
 mod gate;
 mod hard;

@@ -56,7 +56,7 @@ fn hand() -> (Hand, [f32; 3]) {
         stiffness_mpa_per_mm: None,
         friction: None,
     };
-    let other = AnnouncedFinger { width: WIDTH, stiffness: STIFFNESS };
+    let other = AnnouncedFinger { name: None, width: WIDTH, stiffness: STIFFNESS };
     let hello = Hello {
         input: Some(Input::Objects),
         objects: Some(vec![ball(RADIUS_MM), ball(WIDTH * RADIUS_MM)]),

@@ -315,7 +315,8 @@ fn a_map_of_gaps_presses_as_vertices_do() {
 #[test]
 fn each_finger_has_its_own_state_and_factors() {
     let plane = Plane::new();
-    let fingers = [1.0, 2.0].map(|stiffness| AnnouncedFinger { width: 1.0, stiffness });
+    let fingers =
+        [1.0, 2.0].map(|stiffness| AnnouncedFinger { stiffness, ..AnnouncedFinger::default() });
     let hello = Hello { fingers: Some(fingers.to_vec()), ..objects() };
     let hand = plane.hand(&hello).expect("a hand");
     let (first, one) = touch(&hand, 0, &pose(0.2)).expect("an answer");
@@ -389,7 +390,7 @@ fn bad_hellos_are_refused_by_member() {
     let open = Mesh { vertices_mm: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]; 4] };
     let open = AnnouncedObject { shape: AnnouncedShape::Mesh(open), ..ball(1.0) };
     let soft = AnnouncedObject { stiffness_mpa_per_mm: Some(-1.0), ..ball(1.0) };
-    let thin = AnnouncedFinger { width: 0.0, stiffness: 1.0 };
+    let thin = AnnouncedFinger { width: 0.0, ..AnnouncedFinger::default() };
     let with = |objects_: Vec<AnnouncedObject>| Hello { objects: Some(objects_), ..objects() };
     let cases = [
         (Hello { objects: None, ..objects() }, "objects"),

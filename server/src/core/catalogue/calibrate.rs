@@ -61,10 +61,7 @@ pub(crate) fn calibrate_noting(
     if let Some(codec_us) = codec_us() {
         catalogue.overhead.set_us(codec_us + HAND_OVER_US);
     }
-    let pressure_max_pa = catalogue.tiers.first().map_or(1.0, |tier| tier.pressure_max_pa);
-    let mut contact_pa = vec![0.0; MAP_LEN];
-    probe_map(pressure_max_pa, &mut contact_pa);
-    effects::measure(catalogue.finger(), &contact_pa);
+    measure_effects(catalogue);
     tracing::info!(
         tiers = found.join(", "),
         overhead_us = catalogue.overhead.us(),
@@ -72,6 +69,14 @@ pub(crate) fn calibrate_noting(
         "calibrated"
     );
     Ok(())
+}
+
+/// Measures what each effect costs on this finger.
+pub(crate) fn measure_effects(catalogue: &Catalogue) {
+    let pressure_max_pa = catalogue.tiers.first().map_or(1.0, |tier| tier.pressure_max_pa);
+    let mut contact_pa = vec![0.0; MAP_LEN];
+    probe_map(pressure_max_pa, &mut contact_pa);
+    effects::measure(catalogue.finger(), &contact_pa);
 }
 
 /// Measures a tier with its model, in about `share`.

@@ -8,10 +8,13 @@ use papilla_engine::{
     ladder::{Kind, SET_NAMES},
     load_with,
 };
-use papilla_proto::{atlas::Atlas, json};
+use papilla_proto::{
+    atlas::{Atlas, Patch},
+    json,
+};
 use serde_json::Value;
 
-use super::{Held, NamedOnly, Tier, golden};
+use super::{Held, NamedOnly, Tier, TrainedOn, golden};
 use crate::{
     config::Config,
     core::{digest::sha256_hex, latency::Latency},
@@ -92,6 +95,53 @@ pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
     json::text(bytes).map_err(|error| error.to_string())
 }
 
+/// Whether a tier is of the atlas beside it; one that another finger trained is marked, where the
+/// index says so.
+pub(super) fn require_atlas(
+    tier: &mut Tier,
+    atlas: &Atlas,
+    index: &Index,
+    loading: Loading<'_>,
+) -> Result<(), String> {
+    if tier.atlas_hash == atlas.hash() {
+        return Ok(());
+    }
+    let (model, ours) = (&tier.atlas_hash, atlas.hash());
+    let mixed = format!("trained on atlas {model}, but atlas.json is {ours}");
+    let (Some(lender), Some(trained_on)) = (loading.similar, &index.trained_on) else {
+        let hint = loading.similar.map_or_else(String::new, |of| {
+            format!(
+                "; if finger '{name}' trained it, and it is to serve this one by similarity alone, \
+                 index.json has to say so: \"trained_on\": \"{name}\"",
+                name = of.name
+            )
+        });
+        return Err(format!("{mixed}{hint}"));
+    };
+    if trained_on != lender.name {
+        let lender = lender.name;
+        return Err(format!(
+            "{mixed}, and index.json has it from finger '{trained_on}'; '{lender}' is the one finger \
+             whose networks another may borrow"
+        ));
+    }
+    if *model != lender.atlas.hash() {
+        let (lender, its) = (lender.name, lender.atlas.hash());
+        return Err(format!("{mixed}; finger '{lender}', which index.json names, has {its}"));
+    }
+    let apart_px = lender.apart_px(atlas).filter(|px| *px <= APART_MAX_PX);
+    let Some(apart_px) = apart_px else {
+        return Err(format!(
+            "trained on finger '{}', whose pixels show other places of the skin than those of \
+             atlas.json: its network cannot serve this finger, even by similarity; train one",
+            lender.name
+        ));
+    };
+    tier.trained_on = Some(TrainedOn { name: lender.name.to_owned(), apart_px });
+    ours.clone_into(&mut tier.atlas_hash);
+    Ok(())
+}
+
 /// A card, and the same as it was shipped.
 pub(crate) struct ReadCard {
     pub(crate) card: Card,
@@ -115,6 +165,35 @@ pub(crate) struct Loading<'a> {
     backend: Choice,
     calibration: Duration,
     what: What,
+    /// The finger whose networks may serve, by similarity alone; none: its own alone.
+    similar: Option<Similar<'a>>,
+}
+
+/// So far apart the places of one vertex may be on the maps of two fingers of which one borrows the
+/// other's networks, px. A finger that was scaled as a whole is .01 px off, one that is a sixth wider
+/// and else the same 12 px.
+const APART_MAX_PX: f32 = 16.0;
+
+/// A finger whose networks another one borrows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Similar<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) atlas: &'a Atlas,
+}
+
+impl Similar<'_> {
+    /// How far apart the places of one vertex are on the maps of both fingers, at most, px; none if
+    /// the vertices are not the same.
+    fn apart_px(&self, atlas: &Atlas) -> Option<f32> {
+        let mut apart_px: f32 = 0.0;
+        for patch in [Patch::Skin, Patch::Interface] {
+            let [ours, theirs] = [self.atlas, atlas].map(|atlas| &atlas.patch(patch).uv_px);
+            for (a, b) in ours.iter().zip(theirs) {
+                apart_px = apart_px.max((a[0] - b[0]).hypot(a[1] - b[1]));
+            }
+        }
+        (self.atlas.triangles() == atlas.triangles()).then_some(apart_px)
+    }
 }
 
 /// Which models are loaded at once, beside those that run already.
@@ -130,12 +209,18 @@ enum What {
 impl<'a> Loading<'a> {
     pub(crate) fn of(config: &'a Config) -> Self {
         let (default, calibration) = (config.default_tier.as_deref(), config.calibration());
-        Self { default, backend: config.backend, calibration, what: What::OfStart }
+        let backend = config.backend;
+        Self { default, backend, calibration, what: What::OfStart, similar: None }
     }
 
     /// The same, of the default tier's model alone: it answers before the others are loaded.
     pub(crate) fn of_default(config: &'a Config) -> Self {
         Self { what: What::Default, ..Self::of(config) }
+    }
+
+    /// The same of another finger than the default one; it may borrow networks, if its index says so.
+    pub(crate) fn of_finger(self, lender: Similar<'a>) -> Self {
+        Self { default: None, similar: Some(lender), ..self }
     }
 
     /// The same, of all models: none waits until it is named.
@@ -262,6 +347,7 @@ impl TierFiles<'_> {
             onnx_sha256: card.onnx_sha256,
             card: shipped,
             latency,
+            trained_on: None,
             named_only: None,
             retired: false,
         })

@@ -10,15 +10,16 @@ pub(crate) mod replay;
 pub(crate) mod testing;
 mod tier;
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
 use papilla_engine::card::Index;
-use papilla_metrics::TierLabels;
+use papilla_metrics::{TIERS_MAX, TierLabels};
 use papilla_proto::{
     ErrorCode, Problem,
     atlas::{Atlas, Patch, Raster},
+    contact::DEFAULT_FINGER,
     error::shortened,
 };
 use papilla_render::SkinPixels;
@@ -26,13 +27,13 @@ use papilla_session_effects as effects;
 
 use self::{
     assets::Assets,
-    load::{TierFiles, judge, load_ladder, text},
+    load::{TierFiles, judge, load_ladder, require_atlas, text},
     replay::Replay,
 };
 pub(crate) use self::{
     held::Held,
-    load::{Loading, ReadCard},
-    tier::{NamedOnly, Tier},
+    load::{Loading, ReadCard, Similar},
+    tier::{NamedOnly, Tier, TrainedOn},
 };
 use crate::{
     StartError,
@@ -63,11 +64,15 @@ pub(crate) enum Document {
     StateMap(usize, Quantity, Output),
 }
 
-/// All there is to render with and to show.
+/// All there is to render one finger with and to show of it.
 ///
 /// **Invariant:** a tier keeps its place in `tiers` for the life of the process, whatever is
-/// reloaded: jobs and sessions name tiers by their place.
+/// reloaded: jobs and sessions name tiers by their number, in which it is.
 pub(crate) struct Catalogue {
+    /// The finger's name.
+    pub(crate) name: String,
+    /// Its place among the fingers, which it keeps; that of the default finger is 0.
+    pub(crate) place: usize,
     /// In the index's order.
     pub(crate) tiers: Vec<Tier>,
     /// Index of the tier to take unasked.
@@ -90,12 +95,19 @@ pub(crate) struct Catalogue {
     pub(crate) cache: Cache<Document>,
 }
 
+/// The finger and the tier of a number, each by its place.
+pub(crate) fn places(number: usize) -> (usize, usize) {
+    (number / TIERS_MAX, number % TIERS_MAX)
+}
+
 impl Catalogue {
     /// These tiers on this atlas, and nothing else.
     #[cfg(test)]
     pub(crate) fn bare(atlas: Atlas, tiers: Vec<Tier>) -> Self {
         let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
         Self {
+            name: DEFAULT_FINGER.to_owned(),
+            place: 0,
             tiers,
             default: 0,
             atlas_json: Bytes::new(),
@@ -180,15 +192,9 @@ impl Catalogue {
             };
             let card = ReadCard::parse(read(&file)?).map_err(|e| bad(&file, &e))?;
             let files = TierFiles { name, onnx: bytes.as_deref(), card, on_demand };
-            let tier =
+            let mut tier =
                 files.load(loading, states, at_start.len(), running).map_err(|e| bad(&onnx, &e))?;
-            if tier.atlas_hash != atlas.hash() {
-                let (model, ours) = (&tier.atlas_hash, atlas.hash());
-                return Err(bad(
-                    &onnx,
-                    &format!("trained on atlas {model}, but atlas.json is {ours}"),
-                ));
-            }
+            require_atlas(&mut tier, &atlas, &index, loading).map_err(|e| bad(&onnx, &e))?;
             if tier.is_loaded() {
                 note(Step::Loaded(name));
             }
@@ -208,6 +214,8 @@ impl Catalogue {
         let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
         let overhead = Overhead::default();
         Ok(Self {
+            name: DEFAULT_FINGER.to_owned(),
+            place: 0,
             tiers,
             default,
             atlas,
@@ -285,10 +293,20 @@ impl Catalogue {
         self.tiers.iter().enumerate().filter(|(_, tier)| !tier.retired)
     }
 
+    /// The number that jobs and answers name the tier at `place` by.
+    pub(crate) fn tier_number(&self, place: usize) -> usize {
+        self.place * TIERS_MAX + place
+    }
+
     /// What metrics say of each tier, in the order of `tiers`.
     pub(crate) fn tier_labels(&self) -> impl Iterator<Item = TierLabels<'_>> {
-        self.tiers.iter().enumerate().map(|(place, tier)| TierLabels {
-            name: &tier.name,
+        let name = |tier: &'_ str| match self.place {
+            0 => Cow::Owned(tier.to_owned()),
+            _ => Cow::Owned(format!("{}/{tier}", self.name)),
+        };
+        self.tiers.iter().enumerate().map(move |(place, tier)| TierLabels {
+            number: self.tier_number(place),
+            name: name(&tier.name),
             atlas_hash: &tier.atlas_hash,
             onnx_sha256: &tier.onnx_sha256,
             backend: tier.backend_label().unwrap_or("none"),

@@ -76,6 +76,7 @@ pub(crate) fn tier(model: Arc<dyn Model>, relative_l2_median: f64) -> Tier {
         relative_l2_median,
         relative_l2_p95: 0.0,
         knows_contact: false,
+        trained_on: None,
         named_only: None,
         latency: Arc::new(Latency::default()),
         sessions: Arc::new(AtomicUsize::new(0)),

@@ -47,6 +47,9 @@ pub(crate) struct Tier {
     pub(crate) relative_l2_p95: f64,
     /// Whether it learnt the pressure that contact makes, beside FE's.
     pub(crate) knows_contact: bool,
+    /// The finger whose presses trained it, if that is not its catalogue's: it serves by similarity
+    /// alone, and its answers say so.
+    pub(crate) trained_on: Option<TrainedOn>,
     /// Why no budget picks it; None: budgets do.
     pub(crate) named_only: Option<NamedOnly>,
     /// How long it takes here.
@@ -55,6 +58,14 @@ pub(crate) struct Tier {
     pub(crate) sessions: Arc<AtomicUsize>,
     /// A reload found it gone: sessions that have it go on, nobody else gets it.
     pub(crate) retired: bool,
+}
+
+/// The finger whose presses trained a tier of another.
+#[derive(Clone, Debug)]
+pub(crate) struct TrainedOn {
+    pub(crate) name: String,
+    /// How far apart the places of one vertex are on the two maps, at most, px.
+    pub(crate) apart_px: f32,
 }
 
 /// Why a tier is taken by name alone.

@@ -14,10 +14,11 @@ use super::{Reloader, Turn};
 use crate::{
     StartError,
     core::catalogue::{
-        Loading, ReadCard, Tier,
+        Catalogue, Loading, ReadCard, Tier,
         assets::Assets,
         calibrate,
         golden::{self, GoldenError},
+        places,
     },
 };
 
@@ -33,14 +34,15 @@ pub(crate) enum FirstUseError {
 }
 
 impl Reloader {
-    /// Loads the model of the tier at `place`, unless it is there, has failed a moment ago or the
+    /// Loads the model of the tier of this number, unless it is there, has failed a moment ago or the
     /// drain has begun: reads it, holds it to its card and to its golden answers, measures it, and
     /// hands every thread a warm session. Takes seconds; not for a thread that moves bytes.
     ///
     /// # Errors
     /// It is unusable. Nothing has changed then: all other tiers answer as before.
-    pub(crate) fn load_first(&self, _turn: &Turn, place: usize) -> Result<(), Problem> {
-        let catalogue = self.catalogue();
+    pub(crate) fn load_first(&self, _turn: &Turn, number: usize) -> Result<(), Problem> {
+        let (finger, place) = places(number);
+        let Some(catalogue) = self.catalogue_at(finger) else { return Ok(()) };
         let Some(tier) = catalogue.tiers.get(place).filter(|tier| !tier.is_loaded()) else {
             return Ok(());
         };
@@ -50,7 +52,7 @@ impl Reloader {
         if self.is_draining() {
             return Err(super::ReloadError::Draining.into());
         }
-        let result = self.try_load(place, 1);
+        let result = self.try_load(&catalogue, place, 1);
         if tier.on_demand {
             self.metrics.first_use(result.is_ok());
         }
@@ -79,7 +81,7 @@ impl Reloader {
         if tier.is_loaded() || tier.retired || self.is_draining() {
             return Ok(());
         }
-        self.try_load(place, of).map_err(|error| match error {
+        self.try_load(&catalogue, place, of).map_err(|error| match error {
             FirstUseError::File(error) => error,
             error => StartError::Unusable {
                 file: format!("{}.onnx", tier.name),
@@ -89,10 +91,15 @@ impl Reloader {
         })
     }
 
-    fn try_load(&self, place: usize, of: usize) -> Result<(), FirstUseError> {
-        let catalogue = self.catalogue();
+    fn try_load(
+        &self,
+        catalogue: &Arc<Catalogue>,
+        place: usize,
+        of: usize,
+    ) -> Result<(), FirstUseError> {
         let tier: &Tier = &catalogue.tiers[place];
-        let onnx = Assets::one(&self.config, &format!("{}.onnx", tier.name))?;
+        let folder = self.folder_of(catalogue);
+        let onnx = Assets::one(folder.as_deref(), &format!("{}.onnx", tier.name))?;
         let unusable = |error: &dyn std::fmt::Display| FirstUseError::Model(error.to_string());
         // As it was when the tier was listed, which the file's hash has to be that of.
         let card = ReadCard::parse(tier.card.to_string().as_bytes()).map_err(|e| unusable(&e))?;
@@ -109,11 +116,12 @@ impl Reloader {
             // The fewest runs there are: no budget picks it.
             calibrate::measure(tier, model.as_ref(), Duration::ZERO)?;
         }
-        let sessions = self.exchange.prepare_one(&catalogue, place, model.as_ref())?;
+        let sessions = self.exchange.prepare_one(catalogue, place, model.as_ref())?;
         // Threads first: whoever sees that it is loaded may submit a job at once.
-        self.exchange.hand_over(&catalogue, sessions);
+        self.exchange.hand_over(catalogue, sessions);
         tier.held.open(Arc::clone(&model));
-        self.metrics.name_tiers(catalogue.tier_labels());
+        // With its backend.
+        self.name_tiers(&[]);
         let backend = &model.info().backend;
         tracing::info!(tier = tier.name, backend, on_demand = tier.on_demand, "loaded");
         Ok(())

@@ -1,11 +1,15 @@
 //! Models that change while the service runs: load, check, warm, swap; or change nothing.
 
+mod fingers;
 mod first_use;
 mod watch;
 
-use std::sync::{Arc, PoisonError, RwLock, atomic::Ordering};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, PoisonError, RwLock, atomic::Ordering},
+};
 
-use papilla_metrics::{Metrics, TIERS_MAX};
+use papilla_metrics::{Metrics, TIERS_MAX, TierLabels};
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
 use tokio::sync::{Mutex, OwnedMutexGuard, watch::Sender};
@@ -22,15 +26,22 @@ use crate::{
             calibrate,
             golden::{self, GoldenError},
         },
-        scheduler::Exchange,
+        fingers::{BundleError, Named},
+        scheduler::{Exchange, Sessions},
     },
 };
+use fingers::Failed;
 
-/// Holds what there is to render with, and reloads the models of a folder.
+/// Holds what there is to render with, loads the fingers that clients name, and reloads the models
+/// of a folder.
 pub(crate) struct Reloader {
     /// Held to take or put a pointer, for nothing else. A lock-free pointer would allocate when a
     /// thread first reads it, which may be in the middle of a session's frames.
     running: RwLock<Arc<Catalogue>>,
+    /// The fingers beside it, by their places from 1; held likewise.
+    named: RwLock<Vec<Named>>,
+    /// Those that could not be loaded a moment ago.
+    failed: Failed,
     /// True once the server drains.
     drain: Arc<Sender<bool>>,
     config: Config,
@@ -53,12 +64,25 @@ pub(crate) struct Changes {
     pub(crate) changed: Vec<String>,
     pub(crate) removed: Vec<String>,
     pub(crate) unchanged: Vec<String>,
+    /// The same of the fingers beside the default one.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) fingers: BTreeMap<String, Changes>,
+}
+
+/// What takes the place of a catalogue.
+struct Renewed {
+    catalogue: Arc<Catalogue>,
+    sessions: Vec<Sessions>,
+    changes: Changes,
 }
 
 /// Why nothing was changed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ReloadError {
-    #[error("the models in the binary cannot change; start the service with --models DIR")]
+    #[error(
+        "the models in the binary cannot change; start the service with --models DIR, or with \
+         --fingers DIR"
+    )]
     Embedded,
     #[error("models are being loaded already; try again in a moment")]
     Busy,
@@ -74,6 +98,10 @@ pub(crate) enum ReloadError {
     BrokenPromise { tier: String, effect: String },
     #[error("more than {TIERS_MAX} tier names since the start; restart the service")]
     TooMany,
+    #[error("finger '{name}': {source}")]
+    Finger { name: String, source: Box<ReloadError> },
+    #[error(transparent)]
+    Bundle(#[from] BundleError),
 }
 
 impl From<ReloadError> for Problem {
@@ -95,8 +123,17 @@ impl Reloader {
         metrics: Arc<Metrics>,
         drain: Arc<Sender<bool>>,
     ) -> Self {
-        let running = RwLock::new(catalogue);
-        Self { running, drain, config: config.clone(), exchange, metrics, turn: Arc::default() }
+        metrics.fingers_loaded.set(1);
+        Self {
+            running: RwLock::new(catalogue),
+            named: RwLock::default(),
+            failed: Failed::default(),
+            drain,
+            config: config.clone(),
+            exchange,
+            metrics,
+            turn: Arc::default(),
+        }
     }
 
     /// What there is to render with now; it may be replaced at any time, so whoever needs it
@@ -139,43 +176,86 @@ impl Reloader {
     }
 
     fn replace(&self) -> Result<Changes, ReloadError> {
-        if self.config.models.is_none() {
+        if self.config.models.is_none() && self.config.fingers.is_none() {
             return Err(ReloadError::Embedded);
         }
+        let old = self.catalogue();
+        let default = match self.config.models {
+            Some(_) => Some(self.renew_default(&old)?),
+            None => None,
+        };
+        let fingers = self.renew_fingers()?;
+        // From here on nothing fails. Threads first: whoever reads a new catalogue may submit a job
+        // for a new tier at once.
+        let coming = fingers.iter().filter_map(|(_, next)| next.catalogue());
+        let coming: Vec<_> = default.iter().map(|new| &new.catalogue).chain(coming).collect();
+        self.name_tiers(&coming);
+        let mut changes = match default {
+            Some(renewed) => {
+                self.exchange.hand_over(&renewed.catalogue, renewed.sessions);
+                *self.running.write().unwrap_or_else(PoisonError::into_inner) = renewed.catalogue;
+                renewed.changes
+            }
+            None => Changes {
+                default: old.tiers[old.default].name.clone(),
+                unchanged: old.offered().map(|(_, tier)| tier.name.clone()).collect(),
+                ..Changes::default()
+            },
+        };
+        changes.fingers = self.put_fingers(fingers);
+        // Those that are gone.
+        self.name_tiers(&[]);
+        Ok(changes)
+    }
+
+    fn renew_default(&self, old: &Arc<Catalogue>) -> Result<Renewed, ReloadError> {
         let assets = Assets::of_unless(&self.config, &|| self.is_draining())?
             .ok_or(ReloadError::Draining)?;
+        let new = Catalogue::load(&assets, Loading::of(&self.config), Some(old))?;
+        self.renew(new, old)
+    }
+
+    /// What takes the place of a catalogue: its new models are checked and measured, and warm.
+    fn renew(&self, new: Catalogue, old: &Catalogue) -> Result<Renewed, ReloadError> {
         let go_on = || if self.is_draining() { Err(ReloadError::Draining) } else { Ok(()) };
-        let old = self.catalogue();
-        let new = Catalogue::load(&assets, Loading::of(&self.config), Some(&old))?;
         if new.atlas.hash() != old.atlas.hash() {
-            let [found, running] = [&new, &old].map(|c| c.atlas.hash().to_owned());
+            let [found, running] = [&new, old].map(|c| c.atlas.hash().to_owned());
             return Err(ReloadError::OtherAtlas { found, running });
         }
-        for tier in new.tiers.iter().filter(|tier| is_new(tier, &old)) {
+        for tier in new.tiers.iter().filter(|tier| is_new(tier, old)) {
             let name = || tier.name.clone();
             go_on()?;
             if let Some(model) = tier.model() {
                 golden::check(new.golden_states(), model.as_ref(), tier.relative_l2_p95)
                     .map_err(|source| ReloadError::Golden { tier: name(), source })?;
             }
-            keeps_promises(tier, &old)?;
+            keeps_promises(tier, old)?;
         }
-        let (new, changes) = succeed(new, &old);
+        let (new, changes) = succeed(new, old);
         if new.tiers.len() > TIERS_MAX {
             return Err(ReloadError::TooMany);
         }
         go_on()?;
         calibrate::calibrate(&new, self.config.calibration())?;
         go_on()?;
-        let new = Arc::new(new);
-        let fresh = |place: usize| is_new(&new.tiers[place], &old);
+        let fresh = |place: usize| is_new(&new.tiers[place], old);
         let sessions = self.exchange.prepare(&new, fresh)?;
-        // From here on nothing fails. Threads first: whoever reads the new catalogue may
-        // submit a job for a new tier at once.
-        self.metrics.name_tiers(new.tier_labels());
-        self.exchange.hand_over(&new, sessions);
-        *self.running.write().unwrap_or_else(PoisonError::into_inner) = new;
-        Ok(changes)
+        Ok(Renewed { catalogue: Arc::new(new), sessions, changes })
+    }
+
+    /// Tells the metrics which tiers there are, and which will be with the catalogues that come: before
+    /// these are there, so that not one frame goes uncounted.
+    fn name_tiers(&self, coming: &[&Arc<Catalogue>]) {
+        let (default, named) = (self.catalogue(), self.named());
+        let running = named.iter().map(|named| (&named.loaded.catalogue, named.retired));
+        let running = std::iter::once((&default, false)).chain(running);
+        let stays = |of: &(&Arc<Catalogue>, bool)| coming.iter().all(|new| new.place != of.0.place);
+        let all = running.filter(stays).chain(coming.iter().map(|new| (*new, false)));
+        self.metrics.name_tiers(all.clone().flat_map(|(catalogue, retired)| {
+            let labels = catalogue.tier_labels();
+            labels.map(move |of| TierLabels { is_offered: of.is_offered && !retired, ..of })
+        }));
+        self.metrics.fingers_loaded.set(i64::try_from(all.count()).unwrap_or(i64::MAX));
     }
 
     fn is_draining(&self) -> bool {

@@ -17,48 +17,68 @@ use crate::{
 };
 
 /// What a thread renders a tier with; nothing before the tier's first use.
-pub(super) type TierSession = Option<Box<dyn Session>>;
+pub(crate) type TierSession = Option<Box<dyn Session>>;
 
 /// New sessions, each with its tier's place.
-type Sessions = Vec<(usize, TierSession)>;
+pub(crate) type Sessions = Vec<(usize, TierSession)>;
 
-/// The next catalogue, and the sessions it takes beyond those of the last.
+/// The next catalogue of a finger, and the sessions it takes beyond those of the last.
 type Delivery = (Arc<Catalogue>, Sessions);
+
+/// What a thread renders a finger with.
+pub(super) struct OfFinger {
+    pub(super) catalogue: Arc<Catalogue>,
+    /// One per tier, in the catalogue's order.
+    pub(super) sessions: Vec<TierSession>,
+}
 
 /// What waits for one thread.
 #[derive(Default)]
 pub(crate) struct Inbox {
     /// Looked at before every job, so that the lock need not be.
     full: AtomicBool,
-    delivery: Mutex<Option<Delivery>>,
+    /// One a finger at most.
+    deliveries: Mutex<Vec<Delivery>>,
 }
 
 impl Inbox {
     fn put(&self, catalogue: &Arc<Catalogue>, sessions: Sessions) {
-        let mut delivery = self.delivery.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut waiting = delivery.take().map(|(_, waiting)| waiting).unwrap_or_default();
-        waiting.extend(sessions);
-        *delivery = Some((Arc::clone(catalogue), waiting));
+        let mut deliveries = self.deliveries.lock().unwrap_or_else(PoisonError::into_inner);
+        match deliveries.iter_mut().find(|(waiting, _)| waiting.place == catalogue.place) {
+            Some((waiting, its_sessions)) => {
+                *waiting = Arc::clone(catalogue);
+                its_sessions.extend(sessions);
+            }
+            None => deliveries.push((Arc::clone(catalogue), sessions)),
+        }
         self.full.store(true, Ordering::Release);
     }
 
     /// Takes what waits; nearly free if there is nothing.
-    pub(super) fn collect(&self, catalogue: &mut Arc<Catalogue>, sessions: &mut Vec<TierSession>) {
+    pub(super) fn collect(&self, fingers: &mut Vec<OfFinger>) {
         if !self.full.load(Ordering::Acquire) {
             return;
         }
-        let mut delivery = self.delivery.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut deliveries = self.deliveries.lock().unwrap_or_else(PoisonError::into_inner);
         self.full.store(false, Ordering::Release);
-        let Some((new, arrived)) = delivery.take() else { return };
-        drop(delivery);
-        // In the order of the deliveries, so that places are only ever appended at the end.
-        for (place, session) in arrived {
-            match sessions.get_mut(place) {
-                Some(old) => *old = session,
-                None => sessions.push(session),
+        let waiting = std::mem::take(&mut *deliveries);
+        drop(deliveries);
+        // In the order of the deliveries, so that fingers and places are only ever appended at the
+        // end.
+        for (catalogue, arrived) in waiting {
+            let place = catalogue.place;
+            if place == fingers.len() {
+                fingers.push(OfFinger { catalogue: Arc::clone(&catalogue), sessions: Vec::new() });
+            }
+            let Some(finger) = fingers.get_mut(place) else { continue };
+            finger.catalogue = catalogue;
+            for (place, session) in arrived {
+                match finger.sessions.get_mut(place) {
+                    Some(old) => *old = session,
+                    None => finger.sessions.push(session),
+                }
             }
         }
-        *catalogue = new;
     }
 }
 

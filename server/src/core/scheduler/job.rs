@@ -15,7 +15,7 @@ use papilla_session_effects::Effects;
 /// One pressure map on its way to a thread.
 #[derive(Debug)]
 pub(crate) struct Job {
-    /// Index of the tier in the catalogue.
+    /// Number of the tier.
     pub(crate) tier: usize,
     /// The undecoded map: the payload alone, without a head of its transport.
     pub(crate) payload: Bytes,
@@ -116,7 +116,7 @@ impl Default for OutputMeta {
 /// A finished job.
 #[derive(Debug)]
 pub(crate) struct Done {
-    /// Index of the tier.
+    /// Number of the tier.
     pub(crate) tier: usize,
     /// That of [`JobOptions`].
     pub(crate) header: Option<FrameHeader>,

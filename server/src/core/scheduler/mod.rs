@@ -20,7 +20,7 @@ use std::{
 
 use papilla_metrics::Metrics;
 
-pub(crate) use exchange::Exchange;
+pub(crate) use exchange::{Exchange, Sessions};
 pub(crate) use job::{Done, Job, JobOptions, Outcome, OutputMeta, is_past};
 pub(crate) use slot::{Account, Sink, Slot};
 

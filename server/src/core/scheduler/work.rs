@@ -17,24 +17,23 @@ use papilla_session_contact::{Finger, Frame};
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Slot, Times,
     account::{LONG, Spent},
-    exchange::{Inbox, TierSession},
+    exchange::{Inbox, OfFinger},
     queue::{Next, Queue},
 };
 use crate::{
     StartError,
     core::{
         buffers::{HEADROOM, Recycler},
-        catalogue::Catalogue,
+        catalogue::{Catalogue, places},
     },
     problem,
 };
 
 /// Everything a thread owns; nothing is allocated after `prepare`.
 pub(super) struct Worker {
-    catalogue: Arc<Catalogue>,
     metrics: Arc<Metrics>,
-    /// One per tier, in the catalogue's order.
-    sessions: Vec<TierSession>,
+    /// By the places of the fingers.
+    fingers: Vec<OfFinger>,
     maps: Maps,
 }
 
@@ -44,19 +43,16 @@ impl Worker {
         catalogue: &Arc<Catalogue>,
         metrics: Arc<Metrics>,
     ) -> Result<Self, StartError> {
-        let mut worker = Self {
-            sessions: Vec::with_capacity(catalogue.tiers.len()),
-            catalogue: Arc::clone(catalogue),
-            metrics,
-            maps: Maps::default(),
-        };
+        let mut maps = Maps::default();
+        let mut sessions = Vec::with_capacity(catalogue.tiers.len());
         for tier in &catalogue.tiers {
-            let Maps { pressure_pa, sed_j_per_m3, .. } = &mut worker.maps;
+            let Maps { pressure_pa, sed_j_per_m3, .. } = &mut maps;
             let session =
                 tier.model().map(|model| tier.warm_session(&**model, pressure_pa, sed_j_per_m3));
-            worker.sessions.push(session.transpose()?);
+            sessions.push(session.transpose()?);
         }
-        Ok(worker)
+        let fingers = vec![OfFinger { catalogue: Arc::clone(catalogue), sessions }];
+        Ok(Self { metrics, fingers, maps })
     }
 
     /// Serves the queue until it is closed and empty.
@@ -64,7 +60,7 @@ impl Worker {
         loop {
             let next = queue.pop(POP_TIMEOUT);
             // After the wait: a job for a new tier comes only once its session is there.
-            inbox.collect(&mut self.catalogue, &mut self.sessions);
+            inbox.collect(&mut self.fingers);
             let turn = match next {
                 Next::Turn(turn) => turn,
                 Next::Nothing => continue,
@@ -126,10 +122,12 @@ impl Worker {
     }
 
     /// A fresh session takes the place of one that panicked.
-    fn recover(&mut self, index: usize) -> Outcome {
-        let tier = &self.catalogue.tiers[index];
+    fn recover(&mut self, number: usize) -> Outcome {
+        let (finger, place) = places(number);
+        let OfFinger { catalogue, sessions } = &mut self.fingers[finger];
+        let tier = &catalogue.tiers[place];
         if let Some(Ok(session)) = tier.model().map(|model| model.session()) {
-            self.sessions[index] = Some(session);
+            sessions[place] = Some(session);
         }
         Outcome::Failed(problem::internal("the inference panicked", &tier.name))
     }
@@ -172,10 +170,12 @@ impl Worker {
             self.decode(job, &payload)?
         };
         drop(payload);
-        let tier = &self.catalogue.tiers[job.tier];
+        let (of, place) = places(job.tier);
+        let OfFinger { catalogue, sessions } = &mut self.fingers[of];
+        let tier = &catalogue.tiers[place];
         let &JobOptions { headroom, time_us, .. } = options;
         let known = Known {
-            skin: &self.catalogue.skin_pixels,
+            skin: &catalogue.skin_pixels,
             input_max: tier.input_statistics_max,
             response_max_per_mpa: tier.response_max_per_mpa,
         };
@@ -184,7 +184,7 @@ impl Worker {
         let mut rendering =
             Rendering::begin(&mut self.maps, finger_here, effects_here, known, read);
         let time_us = rendering.time_us();
-        let Some(session) = self.sessions[job.tier].as_deref_mut() else {
+        let Some(session) = sessions[place].as_deref_mut() else {
             return Err(problem::internal("a frame of a tier that is not loaded", &tier.name));
         };
         let decoded = Instant::now();
@@ -208,6 +208,8 @@ impl Worker {
         } else {
             let cpu_begun = processor_time();
             rendering.infer(session).map_err(of_network("the inference failed"))?;
+            // What another finger trained knows no map of this one.
+            meta.flags |= if tier.trained_on.is_some() { flags::UNFAMILIAR } else { 0 };
             times.network = processor_time().saturating_sub(cpu_begun);
             times.infer = decoded.elapsed();
             tier.latency.learn(times.infer);
@@ -265,7 +267,8 @@ impl Worker {
     ) -> Result<(MapSummary, PressureRange), Problem> {
         if finger.reads_windows() {
             decode(job.input, payload, &mut self.maps.pressure_pa)?;
-            let (range, skin) = (self.range(job), &self.catalogue.skin_pixels);
+            let (of, range) = (places(job.tier).0, self.range(job));
+            let skin = &self.fingers[of].catalogue.skin_pixels;
             return Ok((self.maps.check_of(finger, range, skin)?, range));
         }
         let Input::Window { sample_type, scale, .. } = job.input else {
@@ -282,8 +285,9 @@ impl Worker {
     }
 
     fn range(&self, job: &Job) -> PressureRange {
+        let (finger, place) = places(job.tier);
         PressureRange {
-            trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
+            trained_max_pa: self.fingers[finger].catalogue.tiers[place].pressure_max_pa,
             beyond: job.options.out_of_range,
         }
     }
@@ -295,8 +299,8 @@ impl Worker {
         payload: &[u8],
     ) -> Result<(MapSummary, PressureRange), Problem> {
         decode(job.input, payload, &mut self.maps.pressure_pa)?;
-        let range = self.range(job);
-        Ok((self.maps.check(range, &self.catalogue.skin_pixels)?, range))
+        let (finger, range) = (places(job.tier).0, self.range(job));
+        Ok((self.maps.check(range, &self.fingers[finger].catalogue.skin_pixels)?, range))
     }
 }
 

@@ -81,7 +81,7 @@ pub(crate) async fn through_pool(
             let total = done.received.elapsed();
             app.metrics.tier(done.tier).total.observe(total);
             let times = [done.times.queue, done.times.infer, total];
-            telemetry::rendered(&app.catalogue().tiers[done.tier].name, times);
+            telemetry::rendered(&app.tier_name(done.tier), times);
             Ok(Rendered { bytes, scale, timings: Timings { times, flags: done.meta.flags } })
         }
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::{
-    extract::State,
+    extract::{Extension, State},
     http::{HeaderMap, Uri},
 };
 use papilla_codec::encode_mask;
@@ -21,26 +21,45 @@ use crate::{
     transport::{
         answer::{Answer, Shared, cached, refuse},
         app::App,
+        gate::Principal,
+        http::finger,
     },
 };
 
-pub(crate) async fn json(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, &headers, Document::Atlas, |catalogue| {
+type Caller = Extension<Principal>;
+
+pub(crate) async fn json(
+    State(app): Shared,
+    Extension(caller): Caller,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Answer {
+    serve(&app, &caller, &uri, &headers, Document::Atlas, |catalogue| {
         Ok(Content::new("application/json", catalogue.atlas_json.clone()))
     })
     .await
 }
 
-pub(crate) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, &headers, Document::AtlasObj, |catalogue| {
+pub(crate) async fn obj(
+    State(app): Shared,
+    Extension(caller): Caller,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Answer {
+    serve(&app, &caller, &uri, &headers, Document::AtlasObj, |catalogue| {
         Ok(Content::new("model/obj", catalogue.atlas.to_obj()))
     })
     .await
 }
 
 /// Both patches as binary glTF, each with its mask as a texture.
-pub(crate) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, &headers, Document::AtlasGlb, |catalogue| {
+pub(crate) async fn glb(
+    State(app): Shared,
+    Extension(caller): Caller,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Answer {
+    serve(&app, &caller, &uri, &headers, Document::AtlasGlb, |catalogue| {
         let masks = [png(&catalogue.skin)?, png(&catalogue.interface)?];
         Ok(Content::new("model/gltf-binary", catalogue.atlas.to_glb(&masks)))
     })
@@ -48,16 +67,17 @@ pub(crate) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
 }
 
 /// White where the patch is: the interface, or with `?patch=skin` the skin.
-pub(crate) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    let patch = match uri.query() {
-        None | Some("" | "patch=interface") => Patch::Interface,
-        Some("patch=skin") => Patch::Skin,
-        Some(_) => {
-            let message = "the parameter is patch=interface or patch=skin";
-            return refuse(&app, Problem::new(ErrorCode::BadQuery, message).at("patch"));
-        }
+pub(crate) async fn mask(
+    State(app): Shared,
+    Extension(caller): Caller,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Answer {
+    let patch = match patch(uri.query().unwrap_or_default()) {
+        Ok(patch) => patch,
+        Err(problem) => return refuse(&app, problem),
     };
-    serve(&app, &headers, Document::Mask(patch), move |catalogue| {
+    serve(&app, &caller, &uri, &headers, Document::Mask(patch), move |catalogue| {
         let raster = match patch {
             Patch::Skin => &catalogue.skin,
             Patch::Interface => &catalogue.interface,
@@ -65,6 +85,22 @@ pub(crate) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> An
         Ok(Content::new("image/png", png(raster)?))
     })
     .await
+}
+
+fn patch(query: &str) -> Result<Patch, Problem> {
+    let mut patch = Patch::Interface;
+    for (name, value) in form_urlencoded::parse(query.as_bytes()) {
+        patch = match (&*name, &*value) {
+            ("finger", _) => patch,
+            ("patch", "interface") => Patch::Interface,
+            ("patch", "skin") => Patch::Skin,
+            _ => {
+                let message = "the parameters are patch=interface or patch=skin, and finger";
+                return Err(Problem::new(ErrorCode::BadQuery, message).at("patch"));
+            }
+        };
+    }
+    Ok(patch)
 }
 
 fn png(raster: &Raster) -> Result<Vec<u8>, Problem> {
@@ -75,12 +111,17 @@ fn png(raster: &Raster) -> Result<Vec<u8>, Problem> {
 }
 
 async fn serve(
-    app: &App,
+    app: &Arc<App>,
+    caller: &Principal,
+    uri: &Uri,
     headers: &HeaderMap,
     document: Document,
     make: impl FnOnce(&Catalogue) -> Result<Content, Problem> + Send + 'static,
 ) -> Answer {
-    let catalogue = app.catalogue();
+    let catalogue = match finger::asked(app, caller, uri).await {
+        Ok(finger) => finger.catalogue,
+        Err(problem) => return refuse(app, problem),
+    };
     let of = Arc::clone(&catalogue);
     let made = cached(&catalogue.cache, headers, document, move || make(&of)).await;
     made.or_else(|problem| refuse(app, problem))

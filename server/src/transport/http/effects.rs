@@ -2,7 +2,6 @@
 
 use axum::{extract::State, response::Response};
 use papilla_proto::RuntimeEffect;
-use papilla_session_contact::ContactAssets;
 use serde_json::{Value, json};
 
 use crate::transport::answer::{Shared, json_answer};
@@ -11,7 +10,7 @@ pub(crate) async fn list(State(app): Shared) -> Response {
     let catalogue = app.catalogue();
     let costs = catalogue.runtime.costs();
     // It is of the contact model, and timed with it.
-    let shear_us = app.contact().and_then(ContactAssets::shear_us);
+    let shear_us = app.contact().and_then(|contact| contact.shear_us());
     let of_traction =
         |effect| shear_us.filter(|_| effect == RuntimeEffect::ShearEnergy).map(|us| us as f64);
     let of_sessions = RuntimeEffect::ALL.into_iter().map(|effect| {

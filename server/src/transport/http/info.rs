@@ -3,8 +3,8 @@
 use std::sync::{Arc, atomic::Ordering};
 
 use axum::{
-    extract::State,
-    http::{HeaderMap, HeaderValue, StatusCode, header},
+    extract::{Extension, State},
+    http::{HeaderMap, HeaderValue, StatusCode, Uri, header},
     response::Response,
 };
 use papilla_metrics::Metrics;
@@ -18,9 +18,14 @@ use crate::{
     core::{
         cache::Content,
         catalogue::{Catalogue, Document},
+        fingers::Loaded,
     },
     problem, progress,
-    transport::answer::{Answer, Shared, answer, cached, json_answer, refusal::label, refuse},
+    transport::{
+        answer::{Answer, Shared, answer, cached, json_answer, refusal::label, refuse},
+        gate::Principal,
+        http::finger,
+    },
 };
 
 /// Alive: the process answers.
@@ -72,8 +77,15 @@ pub(crate) async fn metrics(State(app): Shared) -> Answer {
     Ok(answer("application/openmetrics-text; version=1.0.0; charset=utf-8", text))
 }
 
-pub(crate) async fn tiers(State(app): Shared) -> Response {
-    let catalogue = app.catalogue();
+pub(crate) async fn tiers(
+    State(app): Shared,
+    Extension(caller): Extension<Principal>,
+    uri: Uri,
+) -> Answer {
+    let Loaded { catalogue, contact } = match finger::asked(&app, &caller, &uri).await {
+        Ok(finger) => finger,
+        Err(problem) => return refuse(&app, problem),
+    };
     let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     // The ladder is long and never changes: its JSON is put in as it is.
     let text = format!(
@@ -81,11 +93,11 @@ pub(crate) async fn tiers(State(app): Shared) -> Response {
         json!(catalogue.tiers[catalogue.default].name),
         json!(catalogue.judged_on),
         catalogue.ladder_json,
-        json!(app.contact().map(methods)),
+        json!(contact.as_deref().map(methods)),
         catalogue.overhead.us(),
         json!(tiers),
     );
-    answer("application/json", text)
+    Ok(answer("application/json", text))
 }
 
 /// What each method of contact takes and errs.
@@ -112,6 +124,7 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
         "pattern_max": tier.input_statistics_max,
         "sed_max_j_per_m3": tier.sed_max_j_per_m3,
         "relative_l2_median": tier.relative_l2_median,
+        "trained_on": tier.trained_on.as_ref().map(|lender| &lender.name),
         "named_only": tier.named_only,
         "predicted_latency_us": catalogue.predicted_latency_us(index),
         "calibrated_us": tier.latency.calibrated_us(),
@@ -119,8 +132,16 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
     })
 }
 
-pub(crate) async fn models(State(app): Shared, headers: HeaderMap) -> Answer {
-    let catalogue = app.catalogue();
+pub(crate) async fn models(
+    State(app): Shared,
+    Extension(caller): Extension<Principal>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Answer {
+    let catalogue = match finger::asked(&app, &caller, &uri).await {
+        Ok(finger) => finger.catalogue,
+        Err(problem) => return refuse(&app, problem),
+    };
     let of = Arc::clone(&catalogue);
     let make = move || {
         let cards: Vec<&Value> = of.offered().map(|(_, tier)| &tier.card).collect();

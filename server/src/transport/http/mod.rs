@@ -3,6 +3,7 @@
 pub(crate) mod admin;
 pub(crate) mod atlas;
 pub(crate) mod effects;
+pub(crate) mod finger;
 pub(crate) mod info;
 pub(crate) mod page;
 pub(crate) mod replay;

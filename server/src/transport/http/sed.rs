@@ -13,7 +13,7 @@ use axum::{
 };
 use papilla_codec::Output;
 use papilla_metrics::Transport;
-use papilla_proto::Problem;
+use papilla_proto::{Problem, contact::DEFAULT_FINGER};
 
 use crate::{
     core::scheduler::{Job, JobOptions},
@@ -25,6 +25,7 @@ use crate::{
         app::App,
         first_use,
         gate::Principal,
+        http::finger,
         negotiate::{self, Query},
     },
 };
@@ -55,11 +56,13 @@ async fn render(
     let query = Query::parse(uri.query().unwrap_or_default())?;
     let input = negotiate::input(headers, &query, &payload)?;
     let output = negotiate::output(headers)?;
-    let catalogue = app.catalogue();
-    let tier = match &query.tier {
+    let name = query.finger.as_deref().unwrap_or(DEFAULT_FINGER);
+    let catalogue = finger::called(app, principal, name).await?.catalogue;
+    let place = match &query.tier {
         Some(name) => catalogue.tier_named(name)?,
         None => catalogue.choose(query.budget(), &[]).unwrap_or(catalogue.default),
     };
+    let tier = catalogue.tier_number(place);
     first_use::wait(app, tier, principal.client.as_ref(), app.timeouts.io).await?;
     let deadline = query.budget().map(|us| received + Duration::from_micros(us.into()));
     let job =
@@ -70,7 +73,7 @@ async fn render(
     let Rendered { bytes, scale, timings } = rendered;
     let mut response = answer(output.content_type(), bytes.freeze());
     let headers = response.headers_mut();
-    timings.label(headers, &catalogue.tiers[tier].name);
+    timings.label(headers, &catalogue.tiers[place].name);
     if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&scale.to_string())) {
         headers.insert("x-sed-max-j-per-m3", white);
     }

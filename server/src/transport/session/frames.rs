@@ -27,6 +27,7 @@ use super::{
 use crate::{
     core::{
         buffers::HEADROOM,
+        catalogue::places,
         scheduler::{Account, Job, JobOptions, Slot},
     },
     problem,
@@ -165,7 +166,7 @@ impl Session {
     /// Sends what the session remembers; every accepted frame is answered.
     async fn seal(&self, reply: Arc<Reply>, app: Arc<App>) {
         let Some(shape) = self.terms.follows else { return };
-        let terms = shape.on(&app.catalogue().tiers[self.terms.tier]);
+        let terms = self.terms.sealed_for(&app, &shape);
         let (memory, wait_max) = (self.terms.memory(), app.timeouts.io);
         // Copying and sealing up to a MiB is not for a thread that moves bytes.
         let sealing = spawn_blocking(move || memory.seal(&app, &terms));
@@ -218,12 +219,18 @@ impl Session {
 
     /// Goes on with another tier where the budget calls for one.
     fn keep_budget(&mut self, connection: &Connection, now: Instant) {
-        let Some(budget) = &mut self.terms.budget else { return };
-        let (catalogue, old) = (connection.app.catalogue(), self.terms.tier);
-        if let Some(place) = budget.next(&catalogue, old, &connection.reply.counts, now) {
-            let (from, to) = (&catalogue.tiers[old], &catalogue.tiers[place]);
-            tracing::debug!(session = self.number, from = from.name, to = to.name, "another tier");
-            self.terms.move_to(place, to);
+        let counts = &connection.reply.counts;
+        for (part, counts) in self.terms.parts_mut().iter_mut().zip(counts) {
+            let Some(budget) = &mut part.budget else { continue };
+            let catalogue = connection.app.reloader.catalogue_at(part.finger);
+            let Some(catalogue) = catalogue else { continue };
+            let old = places(part.tier).1;
+            if let Some(place) = budget.next(&catalogue, old, counts, now) {
+                let (from, to) = (&catalogue.tiers[old], &catalogue.tiers[place]);
+                let (session, from, to) = (self.number, &from.name, &to.name);
+                tracing::debug!(session, from, to, "another tier");
+                part.move_to(&catalogue, place);
+            }
         }
     }
 
@@ -248,8 +255,9 @@ impl Session {
             0 => self.terms.budget_us,
             us => Some(us),
         };
+        let part = self.terms.part(finger);
         Ok(Job {
-            tier: self.terms.tier,
+            tier: part.tier,
             payload,
             input: Input::Window {
                 window: header.window(),
@@ -265,7 +273,7 @@ impl Session {
                 time_us: header.client_time_us,
                 effects: self.terms.effects.get(finger).cloned(),
                 finger: hand.fingers().get(finger).cloned(),
-                contact_us: self.terms.contact_us,
+                contact_us: part.contact_us,
                 is_contact_alone: !self.terms.shows_sed(),
                 header: Some(header),
             },

@@ -5,8 +5,10 @@ use std::{sync::Arc, time::Instant};
 use bytes::Bytes;
 use papilla_metrics::Shed;
 use papilla_proto::{
-    ClientMessage, ErrorCode, Hello, MessageError, Problem, Ready, ServerMessage, contact::Input,
+    ClientMessage, ErrorCode, Hello, MessageError, Problem, Ready, ServerMessage,
+    contact::{DEFAULT_FINGER, FINGERS_MAX, Input},
 };
+use papilla_session_contact::of_finger;
 use papilla_session_state::is_sealed;
 use tokio::time::timeout;
 
@@ -17,7 +19,10 @@ use super::{
     terms::{self, Terms, ready},
 };
 use crate::{
-    core::desk::{Cancel, NoResult},
+    core::{
+        catalogue::Catalogue,
+        desk::{Cancel, NoResult},
+    },
     problem,
     transport::first_use,
 };
@@ -41,14 +46,14 @@ pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Te
         let message = format!("{ATTEMPTS} messages and no hello that can be met");
         Err(End::Refused(Problem::new(ErrorCode::BadJson, message), close::POLICY))
     });
-    let (terms, hello) = match result.await {
+    let (mut terms, hello) = match result.await {
         Ok(agreed) => agreed?,
         Err(_) => {
             let message = format!("no hello within {wait_max:?}");
             return Err(End::Refused(Problem::new(ErrorCode::Timeout, message), close::POLICY));
         }
     };
-    let ready = ready(&connection.app, number, &terms);
+    let ready = ready(&connection.app, number, &mut terms);
     tracing::debug!(session = number, ?hello, tier = %ready.tier, "session ready");
     connection.reply.send_message(&ServerMessage::Ready(Box::new(ready)));
     Ok(terms)
@@ -125,8 +130,8 @@ pub(super) async fn renew(
         Err(problem) => return Ok(Err(problem)),
     };
     let met = meet(connection, hello, None).await?;
-    Ok(met.map(|(terms, _)| {
-        let ready = ready(&connection.app, number, &terms);
+    Ok(met.map(|(mut terms, _)| {
+        let ready = ready(&connection.app, number, &mut terms);
         (terms, ready)
     }))
 }
@@ -166,18 +171,16 @@ async fn meet(
     Ok(at_desk(connection, work).await?.and_then(|met| met))
 }
 
-/// Waits until what a hello needs is loaded, as long as its client is there: the tier that it names,
-/// or those that its budget may choose from, and the contact model if it may ask for that. A problem
-/// if that fails or takes too long. Whether there is such a tier is found later.
+/// Waits until what a hello needs is loaded, as long as its client is there: the fingers that it names,
+/// of each the tier that it names, or those that its budget may choose from, and the contact model if
+/// it may ask for that. A problem if that fails or takes too long. Whether there is such a tier is
+/// found later.
 async fn first_use(connection: &mut Connection, hello: &Hello) -> Result<Result<(), Problem>, End> {
     let (app, client) = (Arc::clone(&connection.app), connection.client.clone());
-    let catalogue = app.catalogue();
-    let places: Vec<usize> = match (&hello.tier, hello.budget_us) {
-        (Some(name), _) => catalogue.find(name).into_iter().collect(),
-        (None, Some(1..)) => catalogue.to_come().collect(),
-        (None, Some(0) | None) => Vec::new(),
-    };
-    let is_loaded = places.iter().all(|&place| catalogue.tiers[place].is_loaded());
+    let names = names(hello);
+    let is_loaded = names
+        .iter()
+        .all(|(_, name)| app.finger(name).is_ok_and(|of| to_load(&of.catalogue, hello).is_empty()));
     let needs_contact =
         hello.input.unwrap_or_default() != Input::Pressure || !hello.effects.is_empty();
     if is_loaded && (app.knows_contact() || !needs_contact) {
@@ -194,13 +197,53 @@ async fn first_use(connection: &mut Connection, hello: &Hello) -> Result<Result<
             );
             return Err(Problem::new(ErrorCode::Overloaded, message));
         }
-        for place in places {
-            let left = last.saturating_duration_since(Instant::now());
-            first_use::wait(&app, place, client.as_ref(), left).await?;
+        for (number, name) in &names {
+            let left = || last.saturating_duration_since(Instant::now());
+            first_use::wait_for_finger(&app, name, client.as_ref(), left())
+                .await
+                .map_err(|problem| of_hello(problem, *number))?;
+            let Ok(of) = app.finger(name) else { continue };
+            for tier in to_load(&of.catalogue, hello) {
+                let waited = first_use::wait(&app, tier, client.as_ref(), left()).await;
+                waited.map_err(|problem| of_finger(hello, *number, problem))?;
+            }
         }
         Ok(())
     };
     connection.while_there(loading).await
+}
+
+/// What is wrong with the name of a finger, as a hello is told.
+fn of_hello(mut problem: Problem, number: usize) -> Problem {
+    if problem.code == ErrorCode::NotFound {
+        problem.code = ErrorCode::BadContact;
+    }
+    problem.at(format!("fingers[{number}].name"))
+}
+
+/// The fingers of a hello, each once, with the number of the first that is so called.
+fn names(hello: &Hello) -> Vec<(usize, &str)> {
+    let mut names: Vec<(usize, &str)> = Vec::new();
+    for (number, finger) in hello.fingers.iter().flatten().take(FINGERS_MAX).enumerate() {
+        if names.iter().all(|(_, name)| *name != finger.name()) {
+            names.push((number, finger.name()));
+        }
+    }
+    if names.is_empty() {
+        names.push((0, DEFAULT_FINGER));
+    }
+    names
+}
+
+/// Numbers of the tiers of a finger that a hello needs, or may need, and that are not loaded.
+fn to_load(catalogue: &Catalogue, hello: &Hello) -> Vec<usize> {
+    let places: Vec<usize> = match (&hello.tier, hello.budget_us) {
+        (Some(name), _) => catalogue.find(name).into_iter().collect(),
+        (None, Some(1..)) => catalogue.to_come().collect(),
+        (None, Some(0) | None) => Vec::new(),
+    };
+    let is_missing = |&place: &usize| !catalogue.tiers[place].is_loaded();
+    places.into_iter().filter(is_missing).map(|place| catalogue.tier_number(place)).collect()
 }
 
 /// Does work for a hello at the desk, as long as its client is there; a problem if it is too much.

@@ -11,7 +11,7 @@ use papilla_session_effects::Effects;
 use papilla_session_state::{Reader, SealError, SealedFor, StateError, Writer};
 use sha2::{Digest, Sha256};
 
-use crate::{core::catalogue::Tier, transport::app::App};
+use crate::transport::app::App;
 
 /// The first byte of what is sealed.
 const NOTHING: u8 = 0;
@@ -51,8 +51,14 @@ impl Shape {
         Self(Sha256::digest(text).into())
     }
 
-    pub(super) fn on(self, tier: &Tier) -> SealedFor {
-        SealedFor::of(&tier.name, &[tier.atlas_hash.as_bytes(), &self.0])
+    /// For a session whose first finger has this tier; and the atlases of all fingers it has.
+    pub(super) fn on<'a>(
+        &'a self,
+        tier: &str,
+        atlases: impl Iterator<Item = &'a str>,
+    ) -> SealedFor {
+        let parts: Vec<&[u8]> = atlases.map(str::as_bytes).chain([&self.0[..]]).collect();
+        SealedFor::of(tier, &parts)
     }
 }
 

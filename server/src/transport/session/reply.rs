@@ -12,7 +12,10 @@ use std::{
 use bytes::BytesMut;
 use papilla_codec::Output;
 use papilla_metrics::{Stage, Transport};
-use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN, Problem, ServerMessage, SessionError};
+use papilla_proto::{
+    FrameHeader, FrameStatus, HEADER_LEN, Problem, ServerMessage, SessionError,
+    contact::FINGERS_MAX,
+};
 
 use super::{
     budget::FrameCounts,
@@ -36,8 +39,9 @@ pub(super) struct Reply {
     /// Whether the task waits for the last of them.
     is_awaited: AtomicBool,
     is_over: AtomicBool,
-    /// How the frames fare by their deadlines.
-    pub(super) counts: FrameCounts,
+    /// How the frames fare by their deadlines: of each finger that the session renders with other
+    /// networks.
+    pub(super) counts: [FrameCounts; FINGERS_MAX],
     app: Arc<App>,
 }
 
@@ -48,7 +52,7 @@ impl Reply {
             outstanding: AtomicUsize::new(0),
             is_awaited: AtomicBool::new(false),
             is_over: AtomicBool::new(false),
-            counts: FrameCounts::default(),
+            counts: Default::default(),
             app,
         }
     }
@@ -112,7 +116,7 @@ impl Reply {
         received: Instant,
     ) {
         if status == FrameStatus::Late {
-            self.counts.late(tier);
+            self.counts.iter().for_each(|counts| counts.late(tier));
         }
         let total_us = us(received.elapsed());
         let answer = header.answer(status, total_us, 1.0);
@@ -151,7 +155,7 @@ impl Reply {
         }
         // Counted before it is sent: whoever has the answer finds it in the metrics.
         self.app.metrics.of(Transport::Session).ok.inc();
-        self.counts.good(done.tier);
+        self.counts.iter().for_each(|counts| counts.good(done.tier));
         let timers = self.app.metrics.tier(done.tier);
         let start = Instant::now();
         self.send(bytes, &head);

@@ -7,16 +7,16 @@ use std::sync::{
 
 use papilla_codec::{Output, scale_of};
 use papilla_proto::{
-    ErrorCode, HEADER_LEN, Hello, MAP_SIDE_PX, PROTOCOL_VERSION, Problem, Ready, Resumption,
-    RuntimeEffect, SampleType,
-    contact::{FINGERS_MAX, Input, SampleLayout},
+    ErrorCode, FingerTerms, HEADER_LEN, Hello, MAP_SIDE_PX, PROTOCOL_VERSION, Problem, Ready,
+    Resumption, RuntimeEffect, SampleType, Warning,
+    contact::{DEFAULT_FINGER, FINGERS_MAX, Input, MethodError, SampleLayout},
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
     spikes::PlacedUnit,
 };
-use papilla_session_contact::{ContactAssets, Hand, Skin};
+use papilla_session_contact::{ContactAssets, Hand, Skin, of_finger};
 use papilla_session_effects::Effects;
-use papilla_session_state::tier_of;
+use papilla_session_state::{SealedFor, tier_of};
 use tokio::sync::OwnedSemaphorePermit;
 
 use super::{
@@ -27,20 +27,23 @@ use super::{
 use crate::{
     core::{
         buffers::HEADROOM,
-        catalogue::{Catalogue, Tier},
+        catalogue::{Catalogue, Tier, places},
         desk::Cancel,
+        fingers::Loaded,
     },
     transport::app::App,
 };
 
 /// What hello and ready agreed on.
 pub(super) struct Terms {
-    /// Index of the tier in the catalogue.
-    pub(super) tier: usize,
+    /// What fingers are rendered with: one for each name in the hello.
+    parts: Vec<Part>,
+    /// The part of each finger, by its number.
+    part_of: Vec<usize>,
+    /// Whether the hello names a finger.
+    has_names: bool,
     /// Deadline of frames that name none, us.
     pub(super) budget_us: Option<u32>,
-    /// Who chooses the tier while the session lasts; none: it stays.
-    pub(super) budget: Option<Budget>,
     /// Sample type of the client's frames.
     pub(super) sample_type: SampleType,
     /// Sample type of the answers.
@@ -54,8 +57,6 @@ pub(super) struct Terms {
     /// What was asked for beside the bare map, of each finger; none of the bare map.
     pub(super) effects: Vec<Arc<Mutex<Effects>>>,
     pub(super) hand: Hand,
-    /// Time that a frame's contact is expected to take, us; none if nothing is solved.
-    pub(super) contact_us: Option<u64>,
     _fingers: OwnedSemaphorePermit,
     /// Of clients that follow a request to reconnect: what shapes their state.
     pub(super) follows: Option<Shape>,
@@ -63,14 +64,54 @@ pub(super) struct Terms {
     pub(super) resumption: Option<Resumption>,
     /// What the client is told of them.
     info: ReadyInfo,
+    /// Each finger as it was when this was agreed on, until the client is told: no session keeps
+    /// models that a reload replaces.
+    agreed: Vec<Loaded>,
+}
+
+/// What the fingers of one name are rendered with.
+pub(super) struct Part {
+    /// Place of the finger among those of the service.
+    pub(super) finger: usize,
+    /// Number of the tier.
+    pub(super) tier: usize,
+    /// Who chooses the tier while the session lasts; none: it stays.
+    pub(super) budget: Option<Budget>,
+    /// Time that a frame's contact is expected to take, us; none if nothing is solved.
+    pub(super) contact_us: Option<u64>,
+    atlas_hash: String,
+    /// The first of the session's fingers that is of this part.
+    first: usize,
     permit: Permit,
 }
 
+impl Part {
+    /// Goes on with another tier, by its place in the catalogue.
+    pub(super) fn move_to(&mut self, catalogue: &Catalogue, place: usize) {
+        self.tier = catalogue.tier_number(place);
+        self.permit = Permit::take(&catalogue.tiers[place]);
+    }
+
+    /// The tier, in the catalogue in which it was chosen.
+    fn tier<'a>(&self, of: &'a Loaded) -> &'a Tier {
+        &of.catalogue.tiers[places(self.tier).1]
+    }
+}
+
 impl Terms {
-    /// Goes on with another tier.
-    pub(super) fn move_to(&mut self, place: usize, tier: &Tier) {
-        self.tier = place;
-        self.permit = Permit::take(tier);
+    /// What a finger of the session is rendered with, by its number.
+    pub(super) fn part(&self, finger: usize) -> &Part {
+        &self.parts[self.part_of.get(finger).copied().unwrap_or_default()]
+    }
+
+    pub(super) fn parts_mut(&mut self) -> &mut [Part] {
+        &mut self.parts
+    }
+
+    /// What a state of this shape is sealed for.
+    pub(super) fn sealed_for<'a>(&'a self, app: &App, shape: &'a Shape) -> SealedFor {
+        let atlases = self.parts.iter().map(|part| part.atlas_hash.as_str());
+        shape.on(&app.tier_name(self.part(0).tier), atlases)
     }
 
     /// Whether the network is asked.
@@ -114,8 +155,8 @@ impl Drop for Permit {
 /// What `ready` says of the effects of a session.
 struct ReadyInfo {
     names: Vec<RuntimeEffect>,
-    /// Units of the effect `spikes`.
-    units: Option<Vec<PlacedUnit>>,
+    /// Units of the effect `spikes`, of each finger.
+    units: Vec<Option<Vec<PlacedUnit>>>,
     sections: Vec<Section>,
     /// Whether the network is asked.
     shows_sed: bool,
@@ -124,37 +165,53 @@ struct ReadyInfo {
 impl Default for ReadyInfo {
     /// The bare map.
     fn default() -> Self {
-        Self { names: Vec::new(), units: None, sections: Vec::new(), shows_sed: true }
+        Self { names: Vec::new(), units: Vec::new(), sections: Vec::new(), shows_sed: true }
     }
 }
 
 /// Fingers of a hello that take a place: a session that sends maps of pressure has the memory of
 /// one by itself.
-fn places(hello: &Hello) -> usize {
+fn places_of(hello: &Hello) -> usize {
     let fingers = hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX);
     let sends_maps = hello.input.unwrap_or_default() == Input::Pressure
         && hello.input_layout.unwrap_or_default() == SampleLayout::Map;
     fingers.saturating_sub(usize::from(sends_maps))
 }
 
-/// The fingers of a hello, and their places.
+/// The fingers of a hello on the skins of these, and their places.
 fn hand(
     app: &App,
-    catalogue: &Catalogue,
+    loaded: &[Loaded],
     hello: &Hello,
     cancel: &Cancel,
 ) -> Result<(Hand, OwnedSemaphorePermit), Problem> {
-    let places = app.admit_fingers(places(hello))?;
-    let contact = app.contact();
-    let skin = Skin {
+    let places = app.admit_fingers(places_of(hello))?;
+    let skins: Vec<Skin<'_>> = loaded.iter().map(skin).collect();
+    Ok((Hand::of_each(hello, skins[0], &skins, &|| !cancel.is_set())?, places))
+}
+
+/// The skin of a finger.
+fn skin(Loaded { catalogue, contact }: &Loaded) -> Skin<'_> {
+    let contact = contact.as_deref();
+    Skin {
         atlas: &catalogue.atlas,
         raster: &catalogue.skin,
         model: contact.map(|contact| &contact.model),
         pixels: contact.and_then(|contact| contact.pixels.as_ref()),
         interface: contact.and_then(|contact| contact.interface.as_ref()),
         errors: contact.and_then(|contact| contact.errors.as_ref()),
-    };
-    Ok((Hand::of_until(hello, skin, &|| !cancel.is_set())?, places))
+    }
+}
+
+/// What each finger of a hello is, by its number; one at least. More than there may be are refused
+/// later.
+fn loaded(app: &App, hello: &Hello) -> Result<Vec<Loaded>, Problem> {
+    let announced = hello.fingers.iter().flatten().take(FINGERS_MAX).enumerate();
+    let named = announced.map(|(number, finger)| {
+        app.finger(finger.name()).map_err(|problem| problem.at(format!("fingers[{number}].name")))
+    });
+    let loaded = named.collect::<Result<Vec<_>, _>>()?;
+    if loaded.is_empty() { Ok(vec![app.finger(DEFAULT_FINGER)?]) } else { Ok(loaded) }
 }
 
 /// The effects of the session that a hello names; all others are the tier's.
@@ -175,7 +232,7 @@ pub(super) fn meet(
     let mut terms = agree(app, hello, sealed.and_then(tier_of), cancel)?;
     let Some(sealed) = sealed else { return Ok(terms) };
     let shape = Shape::of(hello);
-    let for_terms = shape.on(&app.catalogue().tiers[terms.tier]);
+    let for_terms = terms.sealed_for(app, &shape);
     let resumption = terms.memory().resume(app, &for_terms, sealed);
     if !matches!(resumption, Resumption::Resumed | Resumption::Nothing) {
         // Nothing of it stays, not even the tier that it named.
@@ -203,21 +260,96 @@ fn agree(
     let is_of_tier = |name: &&String| runtime_effect(name).is_none();
     let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
     let budget_us = hello.budget_us.filter(|&us| us > 0);
-    let catalogue = app.catalogue();
-    let index = match &hello.tier {
+    let by_budget = budget_us.filter(|_| hello.tier.is_none());
+    let loaded = loaded(app, hello)?;
+    let mut parts: Vec<Part> = Vec::new();
+    let mut part_of = Vec::with_capacity(loaded.len());
+    for (number, of) in loaded.iter().enumerate() {
+        let catalogue = &of.catalogue;
+        if let Some(part) = parts.iter().position(|part| part.finger == catalogue.place) {
+            part_of.push(part);
+            continue;
+        }
+        // The state that is brought names the tier of the first finger.
+        let before = before.filter(|_| number == 0);
+        let place = choose(catalogue, hello, &wanted, before)
+            .map_err(|problem| of_finger(hello, number, problem))?;
+        part_of.push(parts.len());
+        parts.push(Part {
+            finger: catalogue.place,
+            tier: catalogue.tier_number(place),
+            budget: by_budget.map(|us| Budget::new(us, wanted.clone())),
+            contact_us: None,
+            atlas_hash: catalogue.atlas.hash().to_owned(),
+            first: number,
+            permit: Permit::take(&catalogue.tiers[place]),
+        });
+    }
+    if let Some(scale) = hello.pressure_scale_pa.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
+        return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
+    }
+    let (hand, fingers) = hand(app, &loaded, hello, cancel)?;
+    for part in &mut parts {
+        let contact = loaded[part.first].contact.as_ref().zip(hand.method_of(part.first));
+        part.contact_us = contact.and_then(|(contact, method)| contact.us_by(method));
+    }
+    let mut effects: Vec<Effects> = Vec::new();
+    for (number, of) in loaded.iter().enumerate() {
+        still_asked(cancel)?;
+        let its_own = Effects::of(hello, of.catalogue.finger());
+        effects.extend(its_own.map_err(|problem| of_finger(hello, number, problem))?);
+        if effects.last().map(Effects::sections) != effects.first().map(Effects::sections) {
+            return Err(of_finger(hello, number, other_sections(number)));
+        }
+    }
+    let info = effects.first().map_or_else(ReadyInfo::default, |first| ReadyInfo {
+        names: first.names().to_vec(),
+        units: effects.iter().map(|of| of.units().map(<[_]>::to_vec)).collect(),
+        sections: first.sections().to_vec(),
+        shows_sed: first.shows_sed(),
+    });
+    Ok(Terms {
+        parts,
+        part_of,
+        has_names: hello.fingers.iter().flatten().any(|finger| finger.name.is_some()),
+        budget_us,
+        sample_type: hello.sample_type,
+        answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
+        pressure_scale_pa: hello.pressure_scale_pa,
+        out_of_range: hello.out_of_range.unwrap_or(OutOfRange::Clamp),
+        stale_after_us: hello.stale_after_us,
+        effects: effects.into_iter().map(|effects| Arc::new(Mutex::new(effects))).collect(),
+        hand,
+        _fingers: fingers,
+        follows: (hello.reconnect == Some(true)).then(|| Shape::of(hello)),
+        resumption: None,
+        info,
+        agreed: loaded,
+    })
+}
+
+/// The place of the tier that renders a finger.
+fn choose(
+    catalogue: &Catalogue,
+    hello: &Hello,
+    wanted: &[String],
+    before: Option<&str>,
+) -> Result<usize, Problem> {
+    let place = match &hello.tier {
         Some(name) => catalogue.tier_named(name)?,
         None => before
             .and_then(|name| catalogue.tier_named(name).ok())
-            .filter(|&index| {
-                let tier = &catalogue.tiers[index];
+            .filter(|&place| {
+                let tier = &catalogue.tiers[place];
                 !tier.retired
                     && tier.is_loaded()
                     && wanted.iter().all(|effect| tier.effects.contains(effect))
             })
-            .or_else(|| catalogue.choose(budget_us, &wanted))
+            .or_else(|| catalogue.choose(hello.budget_us.filter(|&us| us > 0), wanted))
             .unwrap_or(catalogue.default),
     };
-    let tier = &catalogue.tiers[index];
+    let tier = &catalogue.tiers[place];
     if !tier.is_loaded() {
         // Its first use came to nothing, or a reload came between.
         let message = format!("tier {} is not loaded; try again in a moment", tier.name);
@@ -233,61 +365,26 @@ fn agree(
         let message = format!("the client has atlas {hash}, tier {} has {ours}", tier.name);
         return Err(Problem::new(ErrorCode::AtlasMismatch, message).at("atlas_hash"));
     }
-    if let Some(scale) = hello.pressure_scale_pa.filter(|s| !(s.is_finite() && *s > 0.0)) {
-        let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
-        return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
-    }
-    let (hand, fingers) = hand(app, &catalogue, hello, cancel)?;
-    let contact_us = app.contact().and_then(|contact| contact.us_of(&hand));
-    let mut effects = Vec::new();
-    for _ in hand.fingers() {
-        still_asked(cancel)?;
-        effects.extend(Effects::of(hello, catalogue.finger())?);
-    }
-    let info = effects.first().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
-        names: effects.names().to_vec(),
-        units: effects.units().map(<[_]>::to_vec),
-        sections: effects.sections().to_vec(),
-        shows_sed: effects.shows_sed(),
-    });
-    let by_budget = budget_us.filter(|_| hello.tier.is_none());
-    Ok(Terms {
-        tier: index,
-        budget_us,
-        budget: by_budget.map(|us| Budget::new(us, wanted)),
-        sample_type: hello.sample_type,
-        answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
-        pressure_scale_pa: hello.pressure_scale_pa,
-        out_of_range: hello.out_of_range.unwrap_or(OutOfRange::Clamp),
-        stale_after_us: hello.stale_after_us,
-        effects: effects.into_iter().map(|effects| Arc::new(Mutex::new(effects))).collect(),
-        hand,
-        contact_us,
-        _fingers: fingers,
-        follows: (hello.reconnect == Some(true)).then(|| Shape::of(hello)),
-        resumption: None,
-        info,
-        permit: Permit::take(tier),
-    })
+    Ok(place)
 }
 
-/// What the client is told of its terms.
-pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
-    let catalogue = app.catalogue();
-    let tier = &catalogue.tiers[terms.tier];
-    let contact_us = terms.contact_us;
-    let of_tier = if terms.info.shows_sed {
-        catalogue.predicted_latency_us(terms.tier)
-    } else {
-        catalogue.overhead.us()
-    };
-    let shear_us = app.contact().and_then(ContactAssets::shear_us);
-    let feels_shear = terms.info.names.contains(&RuntimeEffect::ShearEnergy);
-    let predicted_latency_us = of_tier
-        .saturating_add(contact_us.unwrap_or(0))
-        .saturating_add(shear_us.filter(|_| feels_shear).unwrap_or(0))
-        .saturating_add(catalogue.runtime.cost_us(&terms.info.names));
-    let value_max = tier.sed_max_j_per_m3;
+/// Answers of one session are laid out alike.
+fn other_sections(number: usize) -> Problem {
+    let message = "answers would be laid out otherwise than those of fingers[0], since its atlas has \
+                   not as many vertices, or the effect 'spikes' not as many units: ask for the \
+                   layout \"map\", give the units by their places, or open a session for each of \
+                   these fingers";
+    Problem::new(ErrorCode::BadContact, message).at(format!("fingers[{number}].name"))
+}
+
+/// What the client is told of its terms, once.
+pub(super) fn ready(app: &App, number: u64, terms: &mut Terms) -> Ready {
+    let agreed = std::mem::take(&mut terms.agreed);
+    let terms = &*terms;
+    let (first, of_first) = (terms.part(0), &agreed[0]);
+    let tier = first.tier(of_first);
+    let predicted = agreed.iter().enumerate().map(|(finger, of)| predicted_us(terms, finger, of));
+    let predicted_latency_us = predicted.max().unwrap_or_default();
     let bare_map = || {
         let output = Output::Samples(terms.answer_sample_type);
         let (offset, bytes) = (HEADER_LEN as u32, output.size_hint() as u32);
@@ -303,8 +400,9 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         let moved = rest.into_iter().map(|s| Section { offset: s.offset + behind, ..s });
         hand.sections().iter().copied().chain(moved).collect()
     };
-    let method = hand.method();
-    let errors = app.contact().and_then(|contact| contact.errors.as_ref());
+    let fingers = || agreed.iter().enumerate();
+    let finger_terms = || fingers().map(|(finger, of)| finger_terms(terms, finger, of)).collect();
+    let borrowed = fingers().filter_map(|(finger, of)| borrowed(terms, finger, of));
     Ready {
         version: PROTOCOL_VERSION.into(),
         session: number,
@@ -318,22 +416,102 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         height: MAP_SIDE_PX as u32,
         sample_type: terms.sample_type,
         pressure_max_pa: tier.pressure_max_pa,
-        sed_scale_j_per_m3: scale_of(Output::Samples(terms.answer_sample_type), value_max),
-        tier_number: tier_number(terms.tier),
-        tier_names: terms
-            .budget
-            .as_ref()
-            .map(|_| catalogue.tiers.iter().map(|tier| tier.name.clone()).collect()),
+        sed_scale_j_per_m3: sed_scale(terms, tier),
+        tier_number: tier_number(first.tier),
+        tier_names: tier_names(app, terms),
         answer_sample_type: terms.answer_sample_type,
         session_effects: terms.info.names.clone(),
         sections: sections(),
-        units: terms.info.units.clone(),
+        units: terms.info.units.first().cloned().flatten(),
         state: terms.resumption,
-        vertices: catalogue.atlas.vertex_count() as u32,
+        vertices: of_first.catalogue.atlas.vertex_count() as u32,
         fingers: hand.fingers().len() as u32,
-        contact_us,
-        method,
-        expected_error: errors.zip(method).and_then(|(errors, of)| errors.of(of)).cloned(),
-        warnings: hand.warnings().to_vec(),
+        finger_terms: terms.has_names.then(finger_terms),
+        contact_us: terms.parts.iter().filter_map(|part| part.contact_us).max(),
+        method: hand.method(),
+        expected_error: expected_error(terms, 0, of_first),
+        warnings: hand.warnings().iter().cloned().chain(borrowed).collect(),
     }
+}
+
+/// Time from receipt to answer that is expected of a finger, us.
+fn predicted_us(terms: &Terms, finger: usize, Loaded { catalogue, contact }: &Loaded) -> u64 {
+    let part = terms.part(finger);
+    let of_tier = if terms.info.shows_sed {
+        catalogue.predicted_latency_us(places(part.tier).1)
+    } else {
+        catalogue.overhead.us()
+    };
+    let shear_us = contact.as_deref().and_then(ContactAssets::shear_us);
+    let feels_shear = terms.info.names.contains(&RuntimeEffect::ShearEnergy);
+    of_tier
+        .saturating_add(part.contact_us.unwrap_or(0))
+        .saturating_add(shear_us.filter(|_| feels_shear).unwrap_or(0))
+        .saturating_add(catalogue.runtime.cost_us(&terms.info.names))
+}
+
+/// J/m3 per unit of scaled answers.
+fn sed_scale(terms: &Terms, tier: &Tier) -> f32 {
+    scale_of(Output::Samples(terms.answer_sample_type), tier.sed_max_j_per_m3)
+}
+
+/// What the method of a finger errs with it.
+fn expected_error(terms: &Terms, finger: usize, of: &Loaded) -> Option<MethodError> {
+    let errors = of.contact.as_ref().and_then(|contact| contact.errors.as_ref());
+    errors.zip(terms.hand.method_of(finger)).and_then(|(errors, of)| errors.of(of)).cloned()
+}
+
+/// The names of tiers by the numbers that answers give, where there are several; numbers that stand
+/// for none have no name.
+fn tier_names(app: &App, terms: &Terms) -> Option<Vec<String>> {
+    let has_budget = terms.parts.iter().any(|part| part.budget.is_some());
+    if !has_budget && terms.parts.len() == 1 {
+        return None;
+    }
+    let mut names = Vec::new();
+    for part in &terms.parts {
+        // As it is now: a tier that has come meanwhile may be taken.
+        let Some(catalogue) = app.reloader.catalogue_at(part.finger) else { continue };
+        for (place, tier) in catalogue.tiers.iter().enumerate() {
+            let number = catalogue.tier_number(place);
+            names.resize(names.len().max(number + 1), String::new());
+            names[number].clone_from(&tier.name);
+        }
+    }
+    Some(names)
+}
+
+fn finger_terms(terms: &Terms, finger: usize, of: &Loaded) -> FingerTerms {
+    let part = terms.part(finger);
+    let tier = part.tier(of);
+    FingerTerms {
+        name: of.catalogue.name.clone(),
+        tier: tier.name.clone(),
+        tier_number: tier_number(part.tier),
+        trained_on: tier.trained_on.as_ref().map(|lender| lender.name.clone()),
+        atlas_hash: tier.atlas_hash.clone(),
+        vertices: of.catalogue.atlas.vertex_count() as u32,
+        pressure_max_pa: tier.pressure_max_pa,
+        sed_scale_j_per_m3: sed_scale(terms, tier),
+        predicted_latency_us: predicted_us(terms, finger, of),
+        method: terms.hand.method_of(finger),
+        expected_error: expected_error(terms, finger, of),
+        units: terms.info.units.get(finger).cloned().flatten(),
+    }
+}
+
+/// What the client is asked about a finger whose network another finger trained.
+fn borrowed(terms: &Terms, finger: usize, of: &Loaded) -> Option<Warning> {
+    let part = terms.part(finger);
+    let lender = part.tier(of).trained_on.as_ref().filter(|_| part.first == finger)?;
+    let question = format!(
+        "finger '{}' has no network of its own: tier {} was trained on finger '{}', so its SED is by \
+         similarity alone (places on the two maps are up to {:.1} px apart), and each answer has the \
+         flag 'unfamiliar'; train a network on this finger",
+        of.catalogue.name,
+        part.tier(of).name,
+        lender.name,
+        lender.apart_px,
+    );
+    Some(Warning { member: format!("fingers[{finger}].name"), value: None, question })
 }

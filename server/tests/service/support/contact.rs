@@ -19,10 +19,15 @@ pub(crate) const RADIUS_MM: f32 = 20.0;
 
 /// Vertices every 10 px from 20 to 200 both ways, 1 mm apart; the middle at the origin.
 pub(crate) fn atlas() -> Atlas {
+    atlas_of(0.1)
+}
+
+/// The same with so many mm a pixel.
+pub(crate) fn atlas_of(mm_per_px: f32) -> Atlas {
     let patch = |z: f32| {
         let at = |i: usize| [i % SIDE, i / SIDE].map(|k| 10.0 * k as f32 + 20.0);
         let uv_px: Vec<[f32; 2]> = (0..SIDE * SIDE).map(at).collect();
-        let place = |&[u, v]: &[f32; 2]| [0.1 * (v - 110.0), -0.1 * (u - 110.0), z];
+        let place = |&[u, v]: &[f32; 2]| [mm_per_px * (v - 110.0), -mm_per_px * (u - 110.0), z];
         PatchVertices { positions_mm: uv_px.iter().map(place).collect(), uv_px }
     };
     let mut triangles = Vec::new();
@@ -32,7 +37,7 @@ pub(crate) fn atlas() -> Atlas {
             triangles.extend([[a, a + s, a + 1], [a + 1, a + s, a + s + 1]]);
         }
     }
-    Atlas::new(0.1, triangles, patch(0.0), patch(0.5)).unwrap()
+    Atlas::new(mm_per_px, triangles, patch(0.0), patch(0.5)).unwrap()
 }
 
 /// A service of this finger, with its contact model.
@@ -49,14 +54,22 @@ pub(crate) async fn service_with(change: impl FnOnce(&mut Config)) -> Service {
 
 /// The contact model's file; its skin is deep, of two layers that are alike.
 pub(crate) fn model() -> Vec<u8> {
-    let young_mpa = 0.75 * f64::from(MODULUS_MPA);
-    let layer = |thickness_mm| Layer { young_mpa, poisson: 0.5 - 1e-6, thickness_mm };
-    model_of(vec![layer(0.2), layer(98.8)])
+    model_on(&atlas(), MODULUS_MPA)
 }
 
-/// The same with other layers.
+/// The same on another atlas of as many vertices, with another E / (1 - nu^2).
+pub(crate) fn model_on(atlas: &Atlas, modulus_mpa: f32) -> Vec<u8> {
+    let young_mpa = 0.75 * f64::from(modulus_mpa);
+    let layer = |thickness_mm| Layer { young_mpa, poisson: 0.5 - 1e-6, thickness_mm };
+    file(atlas, modulus_mpa, vec![layer(0.2), layer(98.8)])
+}
+
+/// [`model`] with other layers.
 pub(crate) fn model_of(layers: Vec<Layer>) -> Vec<u8> {
-    let atlas = atlas();
+    file(&atlas(), MODULUS_MPA, layers)
+}
+
+fn file(atlas: &Atlas, modulus_mpa: f32, layers: Vec<Layer>) -> Vec<u8> {
     let skin = atlas.patch(papilla_proto::atlas::Patch::Skin);
     let vertices = skin.positions_mm.len();
     let header = Header {
@@ -72,7 +85,7 @@ pub(crate) fn model_of(layers: Vec<Layer>) -> Vec<u8> {
         (0..vertices).flat_map(|_| [0.0, 0.0, -1.0]).collect(),
         vec![1.0; vertices],
         atlas.triangles().as_flattened().to_vec(),
-        MODULUS_MPA.into(),
+        modulus_mpa.into(),
     );
     arrays.to_bytes(&header).unwrap()
 }

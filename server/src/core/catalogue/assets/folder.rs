@@ -14,21 +14,21 @@ use papilla_engine::card::Index;
 use papilla_proto::json;
 
 use super::{
-    CONTACT, CONTACT_ERRORS, Files,
+    CONTACT, CONTACT_ERRORS, FINGER, Files,
     detached::{STRANDED_MAX, Unfinished, detached},
 };
 use crate::StartError;
 
 /// Most bytes of one file.
 const FILE_BYTES_MAX: u64 = 256 << 20;
-/// Most bytes of all files that are read.
-const FOLDER_BYTES_MAX: u64 = 1 << 30;
+/// Most bytes of all files that are read of a folder of models.
+pub(super) const FOLDER_BYTES_MAX: u64 = 1 << 30;
 /// Longest time for reading the folder.
 const WAIT_MAX: Duration = Duration::from_secs(20);
 
 /// The files of every service; an index names the models beside them.
-const BASE: [&str; 6] =
-    ["index.json", "atlas.json", "replay.json", "ladder.json", CONTACT, CONTACT_ERRORS];
+const BASE: [&str; 7] =
+    ["index.json", "atlas.json", "replay.json", "ladder.json", CONTACT, CONTACT_ERRORS, FINGER];
 
 /// What there is in a folder.
 #[derive(Debug)]
@@ -43,12 +43,38 @@ pub(super) struct Found {
 /// named in the log. None: it was to stop.
 ///
 /// # Errors
-/// The folder or one of these files cannot be read, is no file, too large, or not read in time.
+/// The folder or one of these files cannot be read, is no file, not read in time, or all of them
+/// have more than `bytes_max`.
 pub(super) fn read(
     folder: &Path,
+    bytes_max: u64,
     is_to_stop: &dyn Fn() -> bool,
 ) -> Result<Option<Found>, StartError> {
-    in_time(folder, is_to_stop, |folder| folder.read())
+    in_time(folder, bytes_max, is_to_stop, |folder| folder.read())
+}
+
+/// The folders within `folder` that hold a file called [`FINGER`], by name; those whose names are not
+/// UTF-8 are passed over.
+///
+/// # Errors
+/// It cannot be read, or not in time.
+pub(super) fn fingers(folder: &Path) -> Result<Vec<String>, StartError> {
+    let list = |folder: Folder<'_>| {
+        let unreadable = |source| StartError::Folder { folder: folder.path.to_owned(), source };
+        let mut names = Vec::new();
+        for entry in fs::read_dir(folder.path).map_err(unreadable)? {
+            let entry = entry.map_err(unreadable)?;
+            if let Ok(name) = entry.file_name().into_string()
+                && entry.path().join(FINGER).is_file()
+            {
+                names.push(name);
+            }
+        }
+        names.sort_unstable();
+        Ok(names)
+    };
+    // Never stopped, so there always is a list.
+    in_time(folder, 0, &|| false, list).map(Option::unwrap_or_default)
 }
 
 /// The bytes of one file of `folder`; none if there is none.
@@ -61,12 +87,13 @@ pub(super) fn read_one(folder: &Path, name: &str) -> Result<Option<Vec<u8>>, Sta
         folder.take(&name, &HashSet::from([name.clone()]))?;
         Ok(folder.files.pop().map(|(_, bytes)| bytes.into_owned()))
     };
-    in_time(folder, &|| false, one).map(Option::flatten)
+    in_time(folder, FILE_BYTES_MAX, &|| false, one).map(Option::flatten)
 }
 
 /// Reads from a folder, within a time; none if it was to stop.
 fn in_time<T: Send + 'static>(
     folder: &Path,
+    bytes_max: u64,
     is_to_stop: &dyn Fn() -> bool,
     read: impl FnOnce(Folder<'_>) -> Result<T, StartError> + Send + 'static,
 ) -> Result<Option<T>, StartError> {
@@ -77,7 +104,7 @@ fn in_time<T: Send + 'static>(
         // Resolved once: a link that is turned meanwhile must not mix two folders.
         let place = fs::canonicalize(&place)
             .map_err(|source| StartError::Folder { folder: place.clone(), source })?;
-        read(Folder { path: &place, left: FOLDER_BYTES_MAX, at: &progress, files: Vec::new() })
+        read(Folder { path: &place, bytes_max, left: bytes_max, at: &progress, files: Vec::new() })
     };
     match detached(reading, WAIT_MAX, is_to_stop) {
         Ok(result) => result.map(Some),
@@ -103,6 +130,8 @@ fn in_time<T: Send + 'static>(
 /// A folder that is being read.
 struct Folder<'a> {
     path: &'a Path,
+    /// Bytes that all its files may have.
+    bytes_max: u64,
     /// Bytes that may still be read.
     left: u64,
     /// The file that is being read.
@@ -164,13 +193,13 @@ impl Folder<'_> {
 
     fn contents(&mut self, path: &Path) -> Result<Vec<u8>, String> {
         let (file, data) = open(path)?;
-        let most = FILE_BYTES_MAX.min(self.left);
+        let (most, folder_max) = (FILE_BYTES_MAX.min(self.left), self.bytes_max);
         let too_large = |bytes: u64| {
             format!(
                 "it has {} MiB; {} MiB of a file and {} of a folder are read",
                 bytes.div_ceil(1 << 20),
-                FILE_BYTES_MAX >> 20,
-                FOLDER_BYTES_MAX >> 20,
+                FILE_BYTES_MAX.min(folder_max) >> 20,
+                folder_max >> 20,
             )
         };
         if data.len() > most {
@@ -191,13 +220,13 @@ fn unusable(folder: &Path, file: String, reason: String) -> StartError {
     StartError::Unusable { file, origin: folder.display().to_string(), reason }
 }
 
-/// The names of the `.onnx`, `.json` and `.contact` files of `folder`.
+/// The names of the `.onnx`, `.json`, `.contact` and `.toml` files of `folder`.
 fn names(folder: &Path) -> io::Result<HashSet<String>> {
     let mut names = HashSet::new();
     for entry in fs::read_dir(folder)? {
         let name = entry?.file_name();
         let ending = Path::new(&name).extension().and_then(|e| e.to_str());
-        let wanted = matches!(ending, Some("onnx" | "json" | "contact"));
+        let wanted = matches!(ending, Some("onnx" | "json" | "contact" | "toml"));
         match (wanted, name.into_string()) {
             (true, Ok(name)) => {
                 names.insert(name);
@@ -258,9 +287,13 @@ mod tests {
         fs::write(folder.join("in.onnx"), b"inside").unwrap();
         let index = r#"{"default": "in", "models": ["in", "../x"]}"#;
         fs::write(folder.join("index.json"), index).unwrap();
-        let files = read(&folder, &|| false).unwrap().unwrap().files;
+        let files = read(&folder, FOLDER_BYTES_MAX, &|| false).unwrap().unwrap().files;
         let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["index.json", "in.onnx"]);
-        assert!(read(&folder, &|| true).unwrap().is_none_or(|read| read.files.len() == 2));
+        assert!(
+            read(&folder, FOLDER_BYTES_MAX, &|| true)
+                .unwrap()
+                .is_none_or(|read| read.files.len() == 2)
+        );
     }
 }

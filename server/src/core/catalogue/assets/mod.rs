@@ -12,6 +12,10 @@ use crate::{StartError, config::Config};
 
 /// The contact model's file among the others.
 pub(crate) const CONTACT: &str = "finger.contact";
+/// What a finger is made of; the file by which its folder is known.
+pub(crate) const FINGER: &str = "finger.toml";
+/// Most bytes of all files of a finger's folder that are read.
+pub(crate) const FINGER_FILES_BYTES_MAX: u64 = 256 << 20;
 /// What methods err with it.
 pub(crate) const CONTACT_ERRORS: &str = "contact.json";
 
@@ -20,6 +24,9 @@ const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs")
 
 /// The origin of those.
 const EMBEDDED: &str = "the binary";
+
+const FINGER_ADVICE: &str = "the folder of a finger holds finger.toml, index.json, atlas.json, and \
+    NAME.onnx and NAME.json of every model in the index; copy it anew if a copy broke off";
 
 /// Files by name.
 type Files = Vec<(String, Cow<'static, [u8]>)>;
@@ -55,16 +62,43 @@ impl Assets {
         is_to_stop: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, StartError> {
         let Some(folder) = &config.models else { return Ok(Some(Self::embedded())) };
-        let read = folder::read(folder, is_to_stop)?;
+        let read = folder::read(folder, folder::FOLDER_BYTES_MAX, is_to_stop)?;
         Ok(read.map(|folder::Found { files, unread }| Self::of_folder(folder, files, unread)))
     }
 
-    /// One file of those that `config` names, without the others.
+    /// The files of a finger's folder; given up once it is to stop: None then.
+    ///
+    /// # Errors
+    /// The folder or one of its files cannot be read.
+    pub(crate) fn of_finger(
+        folder: &Path,
+        is_to_stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, StartError> {
+        let read = folder::read(folder, FINGER_FILES_BYTES_MAX, is_to_stop)?;
+        let assets =
+            read.map(|folder::Found { files, unread }| Self::of_folder(folder, files, unread));
+        Ok(assets.map(|assets| Self { advice: FINGER_ADVICE, ..assets }))
+    }
+
+    /// The names of the fingers in a folder: of each folder in it that holds [`FINGER`].
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub(crate) fn fingers(folder: &Path) -> Result<Vec<String>, StartError> {
+        folder::fingers(folder)
+    }
+
+    /// Bytes of the files that were read.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.files.iter().map(|(_, bytes)| bytes.len() as u64).sum()
+    }
+
+    /// One file of a folder, or else of those built into the binary, without the others.
     ///
     /// # Errors
     /// There is none, or it cannot be read.
-    pub(crate) fn one(config: &Config, file: &str) -> Result<Cow<'static, [u8]>, StartError> {
-        let assets = match &config.models {
+    pub(crate) fn one(folder: Option<&Path>, file: &str) -> Result<Cow<'static, [u8]>, StartError> {
+        let assets = match folder {
             Some(folder) => Self::of_folder(folder, Vec::new(), vec![file.to_owned()]),
             None => Self::embedded(),
         };

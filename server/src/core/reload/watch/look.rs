@@ -1,4 +1,5 @@
-//! What a folder of models looks like from outside: whether it has changed, without reading it.
+//! What a folder of models, or of fingers, looks like from outside: whether it has changed, without
+//! reading it.
 
 use std::{
     fs::{self, Metadata},
@@ -12,13 +13,13 @@ use std::{
 pub(super) struct Look {
     /// Where the path leads, links followed.
     pub(super) folder: PathBuf,
-    /// Its files by name.
+    /// Its files by name, and those of the folders in it.
     files: Vec<File>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct File {
-    name: std::ffi::OsString,
+    path: PathBuf,
     bytes: u64,
     modified: Option<SystemTime>,
     /// Device and number: another file under the same name.
@@ -33,17 +34,30 @@ impl Look {
     pub(super) fn at(path: &Path) -> io::Result<Self> {
         let folder = fs::canonicalize(path)?;
         let mut files = Vec::new();
-        for entry in fs::read_dir(&folder)? {
-            let entry = entry?;
-            // A link to nothing is a file that is missing.
-            if let Ok(data) = fs::metadata(entry.path()) {
-                let (bytes, modified) = (data.len(), data.modified().ok());
-                files.push(File { name: entry.file_name(), bytes, modified, place: place(&data) });
-            }
+        let inner = look_into(&folder, &mut files)?;
+        for folder in inner {
+            // Err: it has gone meanwhile, or is not to be read.
+            let _ = look_into(&folder, &mut files);
         }
         files.sort_unstable();
         Ok(Self { folder, files })
     }
+}
+
+/// Adds what lies in a folder; the folders among it.
+fn look_into(folder: &Path, files: &mut Vec<File>) -> io::Result<Vec<PathBuf>> {
+    let mut inner = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        // A link to nothing is a file that is missing.
+        let Ok(data) = fs::metadata(&path) else { continue };
+        if data.is_dir() {
+            inner.push(path.clone());
+        }
+        let (bytes, modified) = (data.len(), data.modified().ok());
+        files.push(File { path, bytes, modified, place: place(&data) });
+    }
+    Ok(inner)
 }
 
 #[cfg(unix)]
@@ -93,6 +107,12 @@ mod tests {
         let third = Look::at(&link).unwrap();
         fs::write(root.path().join("model"), "model").unwrap();
         assert_ne!(Look::at(&link).unwrap(), third);
+        // A file of a finger.
+        fs::create_dir(v2.join("thumb")).unwrap();
+        fs::write(v2.join("thumb/index.json"), "{}").unwrap();
+        let fourth = Look::at(&link).unwrap();
+        fs::write(v2.join("thumb/index.json"), "{ }").unwrap();
+        assert_ne!(Look::at(&link).unwrap(), fourth);
         fs::remove_dir_all(&v2).unwrap();
         assert!(Look::at(&link).is_err());
     }

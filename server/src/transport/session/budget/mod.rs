@@ -21,7 +21,7 @@ const SHARE_TO_CLIMB: f64 = 0.8;
 /// How the frames of a session fare: counted where answers are sent.
 #[derive(Debug, Default)]
 pub(super) struct FrameCounts {
-    /// The tier that the counts are of: answers of the one before do not count.
+    /// Number of the tier that the counts are of: answers of the one before do not count.
     tier: AtomicUsize,
     late: AtomicU32,
     good: AtomicU32,
@@ -69,7 +69,7 @@ impl Budget {
         Self { budget_us, effects, changed: None, try_after: TRY_AFTER, has_climbed: false }
     }
 
-    /// The tier for the next frame, where it is another than `tier`. Allocates nothing.
+    /// The place of the tier for the next frame, where it is another than `tier`. Allocates nothing.
     pub(super) fn next(
         &mut self,
         catalogue: &Catalogue,
@@ -79,14 +79,14 @@ impl Budget {
     ) -> Option<usize> {
         let Some(changed) = self.changed else {
             self.changed = Some(now);
-            counts.begin(tier);
+            counts.begin(catalogue.tier_number(tier));
             return None;
         };
         let since = now.saturating_duration_since(changed);
         let next = if counts.late.load(Ordering::Relaxed) >= LATE_MOST {
             let faster = self.faster(catalogue, tier);
             if faster.is_none() {
-                counts.begin(tier);
+                counts.begin(catalogue.tier_number(tier));
             }
             faster
         } else if since >= self.try_after && counts.good.load(Ordering::Relaxed) >= GOOD_LEAST {
@@ -102,7 +102,7 @@ impl Budget {
             (false, _) => self.try_after,
         };
         (self.changed, self.has_climbed) = (Some(now), climbs);
-        counts.begin(next);
+        counts.begin(catalogue.tier_number(next));
         Some(next)
     }
 

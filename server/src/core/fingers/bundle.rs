@@ -1,0 +1,83 @@
+//! What a finger's folder holds: what it is made of, its atlas, networks and contact model.
+
+use std::{path::Path, sync::Arc};
+
+use papilla_proto::contact::DEFAULT_FINGER;
+use papilla_session_contact::ContactAssets;
+
+use super::Loaded;
+use crate::{
+    StartError,
+    core::catalogue::{
+        Catalogue, Loading, Similar, Tier,
+        assets::{Assets, CONTACT, CONTACT_ERRORS, FINGER},
+        golden::{self, GoldenError},
+    },
+};
+
+/// A finger's folder, read and checked.
+pub(crate) struct Bundle {
+    pub(crate) catalogue: Catalogue,
+    pub(crate) contact: Option<ContactAssets>,
+    /// Bytes of the files that were read.
+    pub(crate) files_bytes: u64,
+}
+
+/// Why a folder does not make a finger.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum BundleError {
+    #[error(transparent)]
+    File(#[from] StartError),
+    #[error("tier {tier}: {source}")]
+    Golden { tier: String, source: GoldenError },
+    #[error("{0}")]
+    Changed(String),
+}
+
+impl Bundle {
+    /// Reads the folder of the finger called `name`, which will have `place`; None: it was to stop.
+    /// What `running` has already is not loaded again. `default` is the finger whose networks it may
+    /// borrow.
+    ///
+    /// # Errors
+    /// A file is missing, unreadable or at odds with another, or a network answers wrongly.
+    pub(crate) fn read(
+        folder: &Path,
+        (name, place): (&str, usize),
+        loading: Loading<'_>,
+        default: &Catalogue,
+        running: Option<&Loaded>,
+        is_to_stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, BundleError> {
+        let Some(assets) = Assets::of_finger(folder, is_to_stop)? else { return Ok(None) };
+        let bad = |file: &str, reason: String| {
+            let (file, origin) = (file.to_owned(), assets.origin.clone());
+            StartError::Unusable { file, origin, reason }
+        };
+        // What it is made of is for the programs that simulate; without it the folder is no finger's.
+        assets.require(FINGER)?;
+        let lender = Similar { name: DEFAULT_FINGER, atlas: &default.atlas };
+        let before = running.map(|running| &*running.catalogue);
+        let catalogue = Catalogue::load(&assets, loading.of_finger(lender), before)?;
+        let is_known = |tier: &Tier| {
+            let same = |known: &&Tier| Arc::ptr_eq(&known.held, &tier.held);
+            before.is_some_and(|before| before.tiers.iter().find(same).is_some())
+        };
+        for tier in catalogue.tiers.iter().filter(|tier| !is_known(tier)) {
+            if let Some(model) = tier.model() {
+                golden::check(catalogue.golden_states(), model.as_ref(), tier.relative_l2_p95)
+                    .map_err(|source| BundleError::Golden { tier: tier.name.clone(), source })?;
+            }
+        }
+        let contact = match assets.get(CONTACT) {
+            Some(bytes) => {
+                let (errors, skin) = (assets.get(CONTACT_ERRORS), &catalogue.skin);
+                let contact = ContactAssets::read(bytes, errors, &catalogue.atlas, skin);
+                Some(contact.map_err(|error| bad(CONTACT, error.to_string()))?)
+            }
+            None => None,
+        };
+        let catalogue = Catalogue { name: name.to_owned(), place, ..catalogue };
+        Ok(Some(Self { catalogue, contact, files_bytes: assets.bytes() }))
+    }
+}
