@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import urllib.parse
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -53,9 +54,10 @@ class Atlas:
         """Area of the finger that each of `pixels` shows."""
 
     @classmethod
-    def load(cls, url: str = DEFAULT_URL, token: str | None = None) -> Atlas:
-        """From a service; raises Unreachable or Refused."""
-        return cls(get_json(url, "/v1/atlas", token))
+    def load(cls, url: str = DEFAULT_URL, token: str | None = None, *, finger: str | None = None) -> Atlas:
+        """From a service, of its default finger or of `finger`, by name; raises Unreachable or Refused."""
+        query = "" if finger is None else "?" + urllib.parse.urlencode({"finger": finger})
+        return cls(get_json(url, "/v1/atlas" + query, token))
 
     def rasterise(self, vertex_values: ArrayLike) -> Map:
         """A field given at the vertices of the skin, as a map: linear in each triangle."""

@@ -90,6 +90,7 @@ def post(
     pressure_pa: ArrayLike,
     *,
     url: str = DEFAULT_URL,
+    finger: str | None = None,
     tier: str | None = None,
     budget_us: int | None = None,
     token: str | None = None,
@@ -100,7 +101,7 @@ def post(
     """
     body = io.BytesIO()
     np.save(body, check.samples(pressure_pa, WHOLE).astype("<f4", copy=False))
-    asked = {"tier": tier, "budget_us": budget_us}
+    asked = {"finger": finger, "tier": tier, "budget_us": budget_us}
     query = urllib.parse.urlencode({k: v for k, v in asked.items() if v is not None})
     path = "/v1/sed" + (f"?{query}" if query else "")
     answer, headers = request(url, path, body.getvalue(), _NPY, token)
@@ -113,16 +114,18 @@ def sed(
     pressure_pa: ArrayLike,
     *,
     url: str = DEFAULT_URL,
+    finger: str | None = None,
     tier: str | None = None,
     budget_us: int | None = None,
     token: str | None = None,
 ) -> Map:
     """SED (J/m3) of one pressure map (Pa), both 224 x 224.
 
-    `tier` by name, or the most accurate that meets `budget_us`, or the service's default.
+    `finger` by name, or the service's default. `tier` by name, or the most accurate that meets `budget_us`, or the
+    default of the finger.
     Raises BadInput, Refused or Unreachable.
     """
-    return post(pressure_pa, url=url, tier=tier, budget_us=budget_us, token=token).sed
+    return post(pressure_pa, url=url, finger=finger, tier=tier, budget_us=budget_us, token=token).sed
 
 
 def indentation(number: int = 0, *, url: str = DEFAULT_URL, token: str | None = None) -> Indentation:

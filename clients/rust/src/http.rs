@@ -33,12 +33,26 @@ pub fn get(server: &(impl ToAddress + ?Sized), path: &str) -> Result<Vec<u8>, Pa
     body(&address, answer).map(|(_, body)| body)
 }
 
-/// The atlas of the service at `server`.
+/// The atlas of the default finger of the service at `server`.
 ///
 /// # Errors
 /// As [`get`], or the atlas is damaged.
 pub fn atlas(server: &(impl ToAddress + ?Sized)) -> Result<Atlas, PapillaError> {
-    let text = String::from_utf8_lossy(&get(server, "/v1/atlas")?).into_owned();
+    atlas_at(server, "/v1/atlas")
+}
+
+/// The atlas of another finger of that service, by its name.
+///
+/// # Errors
+/// As [`get`], or the atlas is damaged.
+pub fn atlas_of(server: &(impl ToAddress + ?Sized), finger: &str) -> Result<Atlas, PapillaError> {
+    // What is no name of a finger is refused, and stays one parameter.
+    let escaped: String = finger.bytes().map(|byte| format!("%{byte:02x}")).collect();
+    atlas_at(server, &format!("/v1/atlas?finger={escaped}"))
+}
+
+fn atlas_at(server: &(impl ToAddress + ?Sized), path: &str) -> Result<Atlas, PapillaError> {
+    let text = String::from_utf8_lossy(&get(server, path)?).into_owned();
     Ok(Atlas::from_json(&text)?)
 }
 

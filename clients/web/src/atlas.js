@@ -39,9 +39,11 @@ export class Atlas {
   /**
    * @param {string} [base] where the server is: `host:port` or a URL; '' for the server of the page
    * @param {string} [token]
+   * @param {string} [finger] by its name; left out: the server's default finger
    */
-  static async load(base = '', token) {
-    const url = addressOf(base).http('/v1/atlas');
+  static async load(base = '', token, finger) {
+    const query = finger === undefined ? '' : `?finger=${encodeURIComponent(finger)}`;
+    const url = addressOf(base).http(`/v1/atlas${query}`);
     const clean = cleanToken(token);
     const headers = clean ? { authorization: `Bearer ${clean}` } : undefined;
     const response = await fetch(url, { headers, signal: AbortSignal.timeout(PATIENCE_MS) });

@@ -11,11 +11,12 @@ export const PATIENCE_MS = 30000;
  * The SED map of a pressure map, by `POST /v1/sed`.
  * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
  * @param {Float32Array} pressurePa 224 x 224, Pa
- * @param {{tier?: string, budgetUs?: number, token?: string}} [options]
+ * @param {{finger?: string, tier?: string, budgetUs?: number, token?: string}} [options]
  * @returns {Promise<{map: Float32Array, tier: string, totalUs: number}>} rejected with a PapillaError where it is refused
  */
 export async function postPressure(base, pressurePa, options = {}) {
   const url = new URL(addressOf(base).http('/v1/sed'));
+  if (options.finger) url.searchParams.set('finger', options.finger);
   if (options.tier) url.searchParams.set('tier', options.tier);
   if (options.budgetUs) url.searchParams.set('budget_us', String(options.budgetUs));
   /** @type {Record<string, string>} */

@@ -79,7 +79,8 @@ export interface Spread {
 /** What a hand asks for; answers are f32. */
 export interface HandHello {
   objects?: { shape: Shape; stiffness_mpa_per_mm?: number; friction?: number }[];
-  fingers?: { width?: number; stiffness?: number }[];
+  /** `name`: one of `GET /v1/fingers`; left out: the server's default finger. */
+  fingers?: { name?: string; width?: number; stiffness?: number }[];
   input_layout?: 'map' | 'vertices';
   answer_layout?: 'map' | 'vertices';
   /** Left out: the most accurate that can serve, which `ready.method` names. */
@@ -139,6 +140,32 @@ export interface Section {
   bytes: number;
 }
 
+/** What a method errs against finite elements. */
+export interface MethodError {
+  set: string;
+  states: number;
+  pressure_relative_l2: Spread;
+  force_relative: Spread;
+  sed_relative_l2?: Spread;
+}
+
+/** On what terms one finger of a session is rendered. */
+export interface FingerTerms {
+  name: string;
+  tier: string;
+  tier_number: number;
+  /** The finger whose presses trained the tier, if another: its SED is by similarity alone. */
+  trained_on?: string;
+  atlas_hash: string;
+  vertices: number;
+  pressure_max_pa: number;
+  sed_scale_j_per_m3: number;
+  predicted_latency_us: number;
+  method?: ContactMethod;
+  expected_error?: MethodError;
+  units?: Ready['units'];
+}
+
 export interface Ready {
   type: 'ready';
   version: 3;
@@ -163,17 +190,13 @@ export interface Ready {
   fingers: number;
   /** Of the effect `spikes`, by number. */
   units?: { class: 'sa1' | 'ra' | 'pc'; model: number; px: [number, number] }[];
+  /** Of each finger by its number, where the hello names any; what is beside them is of the first. */
+  finger_terms?: FingerTerms[];
   contact_us?: number;
   /** How pressure is found; missing where frames are pressure. */
   method?: ContactMethod;
   /** What that method errs against finite elements; missing where nobody measured it. */
-  expected_error?: {
-    set: string;
-    states: number;
-    pressure_relative_l2: Spread;
-    force_relative: Spread;
-    sed_relative_l2?: Spread;
-  };
+  expected_error?: MethodError;
   /** What of the hello is met, but perhaps not as it was meant. */
   warnings?: { member: string; value?: number; question: string }[];
 }
