@@ -6,7 +6,7 @@
                                                    studies/reports/sensors.md, its picture, and the table
                                                    that papilla.sensors.expected and docs/guides/sensors.md have
 
-Needs a running papilla-server, numpy and matplotlib. `measure` takes some ten minutes on two busy cores.
+Needs a running papilla-server, numpy, matplotlib, and fe-datagen, which draws maps: FE_DATAGEN or PATH. `measure` takes some ten minutes on two busy cores.
 """
 
 import argparse

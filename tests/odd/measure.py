@@ -1,6 +1,7 @@
 """How far odd maps lie from the presses that the shipped networks learnt: five numbers of a pressure map.
 
-    PYTHONPATH=model-export/trainer python tests/odd/measure.py     from the root of the repository; numpy; ten seconds
+    PYTHONPATH=model-export/trainer python tests/odd/measure.py     from the root of the repository; numpy, and fe-datagen
+    in PATH or FE_DATAGEN, which draws the maps when they are first needed; then ten seconds
 
 Roughness: squared steps between neighbouring pixels over four times the squared pressures, 0 (flat) to 1 (every
 pixel against its neighbours). Load: sum of pressure times pixel, near the force in another unit. Their product. Area:

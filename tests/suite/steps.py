@@ -177,8 +177,9 @@ def full() -> list[Step]:
             "the trainer's style and tests",
             "cd model-export/trainer\n"
             '"$TARGET/venv-trainer/bin/python" -m ruff check .\n'
+            'FE_DATAGEN="$BIN/fe-datagen" MODEL_EXPORT="$BIN/model-export" '
             '"$TARGET/venv-trainer/bin/python" -m pytest -q -p no:cacheprovider',
-            after=("python",),
+            after=("build", "python"),
             tests_min=80,
         ),
         Step(

@@ -1,6 +1,6 @@
 //! All maps of a dataset as NumPy arrays, for whoever reads them without this crate.
 
-use super::{Dataset, DatasetError, Field, Maps, ShardMaps};
+use super::{Dataset, DatasetError, Field, Maps, ShardMaps, sha256_hex};
 use ndarray::{Array1, ArrayBase, ArrayView2, Data, Dimension};
 use ndarray_npy::{WritableElement, WriteNpyExt as _, write_zeroed_npy};
 use papilla_atlas::{MAP_LEN, MAP_SIDE_PX, Patch};
@@ -10,9 +10,17 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
+/// Of `maps.json`; raised when the arrays, or how maps are drawn, change.
+const FORMAT: u32 = 1;
+
 /// What was written, and where; also in the folder, as `maps.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ArraysReport {
+    /// Raised when the arrays, or how maps are drawn, change.
+    pub format: u32,
+    /// SHA-256 of the dataset's `manifest.json`: with another one, the maps are of another dataset
+    /// or other splits.
+    pub manifest_sha256: String,
     /// Hash of the dataset that the maps were drawn from.
     pub dataset_sha256: String,
     /// Hash of the atlas.
@@ -64,6 +72,8 @@ fn draw(
     into: &Path,
     out: &Path,
 ) -> Result<ArraysReport, DatasetError> {
+    let path = folder.join("manifest.json");
+    let manifest = fs::read(&path).map_err(OutputError::io("read", &path))?;
     let maps = Maps::read(folder, dataset.atlas())?;
     let states = dataset.manifest().presses.iter().map(|press| press.samples).sum();
     let mut pressure = MapFile::new(&into.join("pressure_pa.npy"), states)?;
@@ -91,6 +101,8 @@ fn draw(
     save(&into.join("state.npy"), &Array1::from(of_press))?;
     save(&into.join("depth_mm.npy"), &Array1::from(depth_mm))?;
     let report = ArraysReport {
+        format: FORMAT,
+        manifest_sha256: sha256_hex(&manifest),
         dataset_sha256: dataset.manifest().dataset_sha256.clone(),
         atlas_hash: dataset.manifest().atlas_hash.clone(),
         states,
@@ -168,6 +180,8 @@ mod tests {
         let out = target.path().join("new/maps");
         let report = arrays(&folder, &out).unwrap();
         let dataset = Dataset::open(&folder).unwrap();
+        let manifest = fs::read(folder.join("manifest.json")).unwrap();
+        assert_eq!(report.manifest_sha256, sha256_hex(&manifest));
         let maps = Maps::read(&folder, dataset.atlas()).unwrap();
         let pressure: Array3<f32> = read_npy(out.join("pressure_pa.npy")).unwrap();
         let sed: Array3<f32> = read_npy(out.join("sed_j_per_m3.npy")).unwrap();

@@ -34,8 +34,6 @@ pub struct ModelInfo {
     pub dataset_sha256: String,
     /// How it was trained: seed, epochs, optimiser, loss, versions, seconds.
     pub training: Value,
-    /// The trainer's own figures on held-out indentations.
-    pub trainer_metrics: Value,
     /// What runs it, with version.
     pub backend: String,
 }
@@ -77,7 +75,6 @@ impl ModelInfo {
             sed_max_j_per_m3: metadata.positive("papilla.sed_max_j_per_m3")?,
             dataset_sha256: metadata.sha256("papilla.dataset_sha256")?,
             training: metadata.json("papilla.training", "JSON")?,
-            trainer_metrics: metadata.json("papilla.metrics", "JSON")?,
             backend: String::new(),
         })
     }

@@ -29,7 +29,7 @@ damaged dataset; 4 the run directory does not fit; 130 interrupted (go on with -
 
 _TRAIN = """\
 Trains a network on the training indentations of a dataset. A tenth of them is set aside to choose
-the epoch by; the test indentations are touched once, after training, for the metrics.
+the epoch by; the test indentations are not touched.
 
 s1-baseN is the published U-Net on maps (two encoding and two decoding stages, MSE on
 max-normalised maps).
@@ -37,26 +37,20 @@ map-cC-kK-rR[-hH][-p2] works on pixels: C components of strain from a linear map
 whole finger and from convolutions over K by K blocks at three resolutions; SED is the sum of their
 squares. A correction of width H follows; p2: on means of 2 by 2 pixels.
 
-Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
-and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with
---resume goes on from the last whole epoch and ends in the same weights, bit for bit."""
-
-_EVALUATE = """\
-Measures a run on the held-out indentations again (train does so at its end): relative L2, far field
-(where SED < 10 % of its maximum), peak, total energy, SSIM; median and bad end. Use it after an
-interrupted run, or to measure the last weights instead of the best."""
+Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv and loss.png. Stop it at
+any time: the same command with --resume goes on from the last whole epoch and ends in the same
+weights, bit for bit. `model-export evaluate` measures what `export` writes."""
 
 _EXPORT = """\
 Writes a run's model as ONNX (opset 17, plain operators only).
 Input `pressure_pa` and output `sed_j_per_m3` are float32 [1, 1, 224, 224] in physical units:
 scaling, the clamp at zero and the interface mask are inside the graph, and the file carries its
-atlas hash, effects, scales, training settings and held-out metrics as metadata."""
+atlas hash, effects, scales and training settings as metadata."""
 
 _MEAN = """\
 Writes the mean of several runs' networks as one model: what each errs by itself partly cancels, for
-the time of all of them. The runs must have learnt the datasets given; the test indentations give
-the metrics. --finer names a dataset solved on a finer mesh than those: the mean is multiplied by
-what brings it closest to SED there."""
+the time of all of them. The runs must have learnt the datasets given. --finer names a dataset
+solved on a finer mesh than those: the mean is multiplied by what brings it closest to SED there."""
 
 _CHECK = """\
 Checks an exported model: legal ONNX with strict shape inference, plain operators, the interface
@@ -69,8 +63,7 @@ own engine with."""
 _OPERATOR = """\
 Writes the finger's own linear operator (what `fe-datagen operator` wrote) as a model, without
 training: a low-rank part of global reach and, with --near, the exact rest at the nearest vertices.
-The dataset's training pressures say which directions matter; its test indentations give the
-metrics."""
+The dataset's training pressures say which directions matter."""
 
 _HALF_SPACE = """\
 Writes the closed form as a model, without training: Boussinesq's stresses in one elastic half-space
@@ -119,11 +112,11 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
         metavar="DIR",
         help="a dataset of which nothing is trained on; may be given again",
     )
-
-    evaluate = command("evaluate", "measure a run on the held-out presses", _EVALUATE)
-    evaluate.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
-    _dataset_argument(evaluate)
-    _weights_argument(evaluate)
+    curve.add_argument(
+        "--model-export",
+        metavar="FILE",
+        help="the program that measures errors ($MODEL_EXPORT, else model-export in PATH)",
+    )
 
     export = command("export", "write a run's model as ONNX", _EXPORT)
     export.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
@@ -254,6 +247,18 @@ def _dataset_argument(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="DIR",
         help="what `fe-datagen generate` wrote; give it again to join datasets of one atlas",
+    )
+    parser.add_argument(
+        "--maps",
+        type=Path,
+        metavar="DIR",
+        help="where maps are kept that `fe-datagen dataset maps` drew, and are put if they never "
+        "were ($PAPILLA_MAPS, else papilla/maps in the user's cache)",
+    )
+    parser.add_argument(
+        "--fe-datagen",
+        metavar="FILE",
+        help="the program that draws maps ($FE_DATAGEN, else fe-datagen in PATH)",
     )
 
 

@@ -15,12 +15,11 @@ from torch import nn
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import CheckError
-from papilla_trainer.evaluation import chosen_epoch, predict, served_model, spread
 from papilla_trainer.export import INPUT, OPSET, OUTPUT
 from papilla_trainer.files import write_atomic
+from papilla_trainer.maps import F32, SIDE_PX
 from papilla_trainer.mean import mean_model
-from papilla_trainer.metrics import F32
-from papilla_trainer.raster import SIDE_PX
+from papilla_trainer.serving import chosen_epoch, predict, served_model, spread
 
 OPERATORS = frozenset(
     {
@@ -52,7 +51,6 @@ METADATA = (
     "sed_max_j_per_m3",
     "dataset_sha256",
     "training",
-    "metrics",
 )
 TOLERANCE = 1e-5
 
@@ -114,8 +112,8 @@ def write_reference(path: Path, pressure_pa: F32, sed_j_per_m3: F32) -> None:
 
 def _held_out(dataset: Dataset, count: int) -> F32:
     ids = [dataset.test_ids[i] for i in spread(len(dataset.test_ids), count)]
-    maps = dataset.load(ids)
-    return maps.pressure_pa[spread(len(maps), count)]
+    states = dataset.states(ids)
+    return np.stack([states[k].pressure_pa for k in spread(len(states), count)])
 
 
 def _session(data: bytes) -> onnxruntime.InferenceSession:
@@ -165,7 +163,7 @@ def _check_metadata(model: onnx.ModelProto, dataset: Dataset, report: CheckRepor
 def _check_output(output: F32, dataset: Dataset, report: CheckReport) -> None:
     report.require(bool(np.isfinite(output).all()), "the output is not finite")
     report.require(bool((output >= 0).all()), "the output is negative somewhere")
-    outside = output[:, dataset.interface.mask() == 0]
+    outside = output[:, dataset.mask() == 0]
     report.require(not outside.any(), "the output is not zero outside the interface patch")
 
 

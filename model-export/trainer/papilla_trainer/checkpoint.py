@@ -37,7 +37,7 @@ class Served:
     def of(dataset: Dataset) -> Served:
         """Mask (uint8 ``[224, 224]``), scales and identities of a dataset."""
         return Served(
-            mask=torch.from_numpy(dataset.interface.mask()).to(torch.uint8),
+            mask=torch.from_numpy(dataset.mask()).to(torch.uint8),
             pressure_max_pa=dataset.pressure_max_pa,
             sed_max_j_per_m3=dataset.sed_max_j_per_m3,
             atlas_hash=dataset.atlas_hash,

@@ -1,4 +1,4 @@
-"""The command line: train, curve, evaluate, export, mean, check, operator, half-space."""
+"""The command line: train, curve, export, mean, check, operator, half-space."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from papilla_trainer.arguments import Command, make_parser
 from papilla_trainer.errors import CheckError, TrainerError, UsageError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from papilla_trainer.dataset import Dataset
     from papilla_trainer.training import Progress
 
 INTERRUPTED = 130
@@ -34,15 +37,13 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.config import TrainConfig
-    from papilla_trainer.evaluation import evaluate_run
-    from papilla_trainer.joined import open_datasets
-    from papilla_trainer.report import metrics_table, plot_history
+    from papilla_trainer.report import plot_history
     from papilla_trainer.training import Trainer
 
     config = TrainConfig(
         **{name: getattr(options, name) for name in TrainConfig.__dataclass_fields__}
     )
-    dataset = open_datasets(options.dataset)
+    dataset = _datasets(options, options.dataset)
     trainer = Trainer(dataset, config, options.out, resume=options.resume)
     with _Bar(trainer.state.epoch, config.epochs, trainer.epoch_samples) as bar:
         try:
@@ -52,7 +53,6 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
                 title = f"{config.network}, {len(trainer.fit_samples)} training samples"
                 history = trainer.state.history
                 plot_history(options.out, history, title, trainer.state.best_epoch)
-    metrics = evaluate_run(options.out, dataset)
     rates = sorted(line["samples_per_s"] for line in state.history)
     result = {
         "run": str(options.out),
@@ -63,12 +63,10 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         "validation_loss": _finite(state.best_loss),
         "seconds": round(state.seconds, 1),
         "samples_per_s": round(rates[len(rates) // 2], 2),
-        "metrics": metrics,
     }
     text = (
         f"{config.network}: {state.epoch} epochs in {state.seconds:.0f} s, epoch "
-        f"{state.best_epoch} chosen\nheld-out presses ({metrics['samples']} samples of "
-        f"{metrics['presses']} presses):\n{_table(metrics, metrics_table)}\n"
+        f"{state.best_epoch} chosen\n"
         f"next: python -m papilla_trainer export {options.out} "
         f"--onnx {options.out}/{config.network}.onnx"
     )
@@ -79,28 +77,22 @@ def _curve(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.config import TrainConfig
     from papilla_trainer.curve import learning_curve, table
     from papilla_trainer.dataset import Dataset
+    from papilla_trainer.maps import Store
 
     config = TrainConfig(
         **{name: getattr(options, name) for name in TrainConfig.__dataclass_fields__}
     )
+    store = Store(options.maps, options.fe_datagen)
     rows = learning_curve(
-        [Dataset(directory) for directory in options.dataset],
-        [Dataset(directory) for directory in options.judge],
+        [Dataset(directory, store) for directory in options.dataset],
+        [Dataset(directory, store) for directory in options.judge],
         config,
         options.presses,
         options.out,
         _Bar,
+        options.model_export,
     )
     return {"network": config.network, "rows": rows}, table(rows)
-
-
-def _evaluate(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.evaluation import evaluate_run
-    from papilla_trainer.joined import open_datasets
-    from papilla_trainer.report import metrics_table
-
-    metrics = evaluate_run(options.run_dir, open_datasets(options.dataset), options.weights)
-    return metrics, _table(metrics, metrics_table)
 
 
 def _export(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -113,13 +105,12 @@ def _export(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 def _check(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.check import check_model
-    from papilla_trainer.joined import open_datasets
 
     if options.samples < 1:
         raise CheckError(f"--samples must be at least 1, not {options.samples}")
     report = check_model(
         options.model,
-        open_datasets(options.dataset),
+        _datasets(options, options.dataset),
         options.run_dirs,
         options.reference,
         options.samples,
@@ -139,11 +130,10 @@ def _check(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 
 def _mean(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.joined import open_datasets
     from papilla_trainer.mean import write_mean
 
-    datasets = open_datasets(options.dataset)
-    finer = options.finer and open_datasets([options.finer])
+    datasets = _datasets(options, options.dataset)
+    finer = options.finer and _datasets(options, [options.finer])
     result = write_mean(options.run_dirs, datasets, finer, options.onnx, options.name)
     return result, _finer_text(result.get("finer")) + _written_text(result)
 
@@ -163,12 +153,11 @@ def _finer_text(found: dict[str, Any] | None) -> str:
 
 def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.comparison.untrained import write_operator
-    from papilla_trainer.joined import open_datasets
 
     _require_rank(options)
     result = write_operator(
         options.operator,
-        open_datasets(options.dataset),
+        _datasets(options, options.dataset),
         options.rank,
         options.near,
         options.onnx,
@@ -180,14 +169,18 @@ def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.comparison.half_space import HalfSpace
     from papilla_trainer.comparison.untrained import write_half_space
-    from papilla_trainer.joined import open_datasets
 
     _require_rank(options)
     body = HalfSpace(options.youngs_modulus_pa, options.poissons_ratio, options.depth_mm)
     if body.youngs_modulus_pa <= 0 or not 0 <= body.poissons_ratio < 0.5 or body.depth_mm <= 0:
         raise UsageError("modulus and depth must be positive, Poisson's ratio in 0 .. 0.5")
     result = write_half_space(
-        body, open_datasets(options.dataset), options.rank, options.near, options.onnx, options.name
+        body,
+        _datasets(options, options.dataset),
+        options.rank,
+        options.near,
+        options.onnx,
+        options.name,
     )
     return result, _written_text(result)
 
@@ -198,16 +191,19 @@ def _require_rank(options: argparse.Namespace) -> None:
 
 
 def _written_text(result: dict[str, Any]) -> str:
-    from papilla_trainer.report import metrics_table
+    return f"{result['model']}: {result['bytes']} bytes"
 
-    table = _table(result["metrics"], metrics_table)
-    return f"{result['model']}: {result['bytes']} bytes\nheld-out presses:\n{table}"
+
+def _datasets(options: argparse.Namespace, folders: list[Path]) -> Dataset:
+    from papilla_trainer.joined import open_datasets
+    from papilla_trainer.maps import Store
+
+    return open_datasets(folders, Store(options.maps, options.fe_datagen))
 
 
 _COMMANDS: dict[str, Command] = {
     "train": _train,
     "curve": _curve,
-    "evaluate": _evaluate,
     "export": _export,
     "mean": _mean,
     "check": _check,
@@ -251,11 +247,6 @@ class _Bar:
                 f"{line['samples_per_s']:.1f} samples/s, about {left / 60:.1f} min left",
                 file=sys.stderr,
             )
-
-
-def _table(metrics: dict[str, Any], render: Any) -> str:
-    rendered: str = render({k: v for k, v in metrics.items() if isinstance(v, dict)})
-    return rendered
 
 
 def _finite(value: float) -> float | None:

@@ -9,48 +9,29 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from papilla_trainer.dataset import Dataset, Maps, read_npz
+from papilla_trainer.dataset import Dataset, State
 from papilla_trainer.errors import DatasetError
+from papilla_trainer.files import read_npz
 from papilla_trainer.joined import STRIDE
-from papilla_trainer.raster import SIDE_PX
-
-F32 = NDArray[np.float32]
+from papilla_trainer.maps import F32, SIDE_PX
 
 
-def with_contact(maps: Maps, dataset: Dataset, paths: list[str]) -> Maps:
-    """The samples, and once more those that a file has a pressure of: that one, and FE's SED."""
-    state = _state_of(maps)
-    row_of = {
-        (int(p), int(s)): row for row, (p, s) in enumerate(zip(maps.press_id, state, strict=True))
-    }
-    pressures, rows = [maps.pressure_pa], [np.arange(len(maps))]
+def with_contact(states: list[State], dataset: Dataset, paths: list[str]) -> list[State]:
+    """The states, and once more those that a file has a pressure of: that one, and FE's SED."""
+    known = {(state.press_id, state.state): state for state in states}
+    found = list(states)
     for path in paths:
-        press, states, pressure = _read(Path(path), dataset)
-        found = [
-            (k, row_of[key])
-            for k, key in enumerate(zip(press, states, strict=True))
-            if key in row_of
-        ]
-        pressures.append(pressure[[k for k, _ in found]])
-        rows.append(np.array([row for _, row in found], dtype=np.int64))
-    row = np.concatenate(rows)
-    return Maps(
-        np.concatenate(pressures), maps.sed_j_per_m3[row], maps.press_id[row], maps.depth_mm[row]
-    )
-
-
-def _state_of(maps: Maps) -> NDArray[np.int64]:
-    """Which state of its press each sample is: those of a press follow one another."""
-    index = np.arange(len(maps))
-    begins = np.r_[True, maps.press_id[1:] != maps.press_id[:-1]]
-    return index - np.maximum.accumulate(np.where(begins, index, 0))
+        press, numbers, pressure = _read(Path(path), dataset)
+        for key, own in zip(zip(press, numbers, strict=True), pressure, strict=True):
+            if key in known:
+                found.append(known[key]._replace(pressure_pa=own))
+    return found
 
 
 def _read(path: Path, dataset: Dataset) -> tuple[list[int], list[int], F32]:
     """Presses, by their numbers in ``dataset``, states, and pressures ``[N, 224, 224]``, Pa."""
-    arrays = read_npz(path, path.name)
+    arrays = read_npz(path)
     try:
         sha256 = arrays["dataset_sha256"].tobytes().decode("ascii", "replace")
         press, state, pressure = (arrays[k] for k in ("press", "state", "pressure_pa"))

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import io
+import json
 import math
+import os
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,34 +15,53 @@ from typing import Any
 
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset, fewer, validation_split
-from papilla_trainer.errors import UsageError
-from papilla_trainer.evaluation import measure, served_model
+from papilla_trainer.errors import TrainerError, UsageError
+from papilla_trainer.export import export_run
 from papilla_trainer.files import write_atomic, write_json
 from papilla_trainer.joined import JoinedDataset
 from papilla_trainer.report import write_csv
 from papilla_trainer.training import Trainer
 
 FIGURES = ("relative_l2", "far_field_relative_l2")
+PROGRAM_VARIABLE = "MODEL_EXPORT"
 
 
 @dataclass(frozen=True)
 class Jury:
-    """A set that each network is judged on: presses of one dataset."""
+    """A set that each network is judged on: a dataset, or its held-out part."""
 
     name: str
-    dataset: Dataset
-    press_ids: list[int]
+    directory: Path
+    split: str
 
 
 def juries(parts: list[Dataset], others: list[Dataset]) -> list[Jury]:
     """The held-out indentations of what is trained on, and all indentations of ``others``."""
     trained = {part.dataset_sha256 for part in parts}
-    own = [Jury(f"{p.directory.name}, held out", p, p.test_ids) for p in parts]
+    own = [Jury(f"{p.directory.name}, held out", p.directory, "test") for p in parts]
     for other in others:
         if other.dataset_sha256 in trained:
             raise UsageError(f"--judge {other.directory}: it is trained on")
-        own.append(Jury(other.directory.name, other, sorted(other.presses)))
+        own.append(Jury(other.directory.name, other.directory, "all"))
     return own
+
+
+def judged(model: Path, jury: Jury, program: str | None) -> dict[str, Any]:
+    """The model's errors as `model-export evaluate` measures them."""
+    named = program or os.environ.get(PROGRAM_VARIABLE) or "model-export"
+    path = shutil.which(named)
+    if path is None:
+        raise UsageError(
+            f"there is no program {named!r}, which measures the networks: build it with `cargo "
+            "build --release -p papilla-model-export` and name it by --model-export or "
+            f"{PROGRAM_VARIABLE} (target/release/model-export)"
+        )
+    command = [path, "evaluate", str(model), str(jury.directory), "--split", jury.split, "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    if done.returncode != 0:
+        raise TrainerError(f"{' '.join(command)} failed: {done.stderr.strip()}")
+    metrics: dict[str, Any] = json.loads(done.stdout)["card"]["metrics"]
+    return metrics
 
 
 def learning_curve(
@@ -48,8 +71,13 @@ def learning_curve(
     presses: list[int],
     out: Path,
     bar: Callable[[int, int, int], Any],
+    program: str | None = None,
 ) -> list[dict[str, Any]]:
-    """A row for each number of indentations and each jury; ``bar`` shows a run."""
+    """A row for each number of indentations and each jury; ``bar`` shows a run.
+
+    ``program``: model-export; without it ``MODEL_EXPORT`` names it, else it is looked for in
+    ``PATH``.
+    """
     dataset = parts[0] if len(parts) == 1 else JoinedDataset(parts)
     aside = config.validation_count(len(dataset.train_ids))
     fit_ids, _ = validation_split(dataset.train_ids, aside, config.seed)
@@ -63,12 +91,13 @@ def learning_curve(
         # As many steps on few samples as on all.
         epochs = math.ceil(config.epochs * every / samples)
         settings = replace(config, train_presses=count, epochs=epochs)
-        trainer = Trainer(dataset, settings, out / f"presses-{count}", resume=True)
+        run = out / f"presses-{count}"
+        trainer = Trainer(dataset, settings, run, resume=True)
         with bar(trainer.state.epoch, epochs, samples) as progress:
             state = trainer.fit(progress.listen)
-        model = served_model(state)
+        model = export_run(run, run / f"{config.network}.onnx")
         for jury in panel:
-            metrics, _ = measure(model, jury.dataset, jury.press_ids)
+            metrics = judged(model, jury, program)
             row = {"presses": count, "samples": samples, "epochs": epochs}
             row |= {"seconds": round(state.seconds, 1), "judged_on": jury.name}
             row |= {f"{f}_{k}": v for f in FIGURES for k, v in metrics.get(f, {}).items()}

@@ -17,9 +17,9 @@ from torch import nn
 from papilla_trainer import __version__
 from papilla_trainer.checkpoint import Checkpoint, Served
 from papilla_trainer.config import TrainConfig
-from papilla_trainer.evaluation import chosen_epoch, read_metrics, served_model
 from papilla_trainer.files import write_atomic
-from papilla_trainer.raster import SIDE_PX
+from papilla_trainer.maps import SIDE_PX
+from papilla_trainer.serving import chosen_epoch, served_model
 
 OPSET = 17
 INPUT = "pressure_pa"
@@ -32,9 +32,8 @@ _SMALL = {"float32": np.float16, "int64": np.int16}
 def export_run(run_dir: Path, out: Path, name: str | None = None, weights: str = "best") -> Path:
     """Write the run's model with its metadata to ``out``; returns ``out``."""
     checkpoint = Checkpoint.load(run_dir)
-    metrics = read_metrics(run_dir, checkpoint, weights)
     model = to_onnx(served_model(checkpoint, weights))
-    return write_model(model, metadata(checkpoint, metrics, name or out.stem, weights), out)
+    return write_model(model, metadata(checkpoint, name or out.stem, weights), out)
 
 
 def write_model(model: onnx.ModelProto, metadata_props: dict[str, str], out: Path) -> Path:
@@ -105,13 +104,11 @@ def _store_small(model: onnx.ModelProto) -> None:
     model.graph.initializer.extend(constants)
 
 
-def metadata(
-    checkpoint: Checkpoint, metrics: dict[str, Any], name: str, weights: str
-) -> dict[str, str]:
+def metadata(checkpoint: Checkpoint, name: str, weights: str) -> dict[str, str]:
     """The ``metadata_props`` that engine and server read; every value is a string."""
     network = TrainConfig(**checkpoint.config).spec.as_json()
     training = training_record(checkpoint, weights)
-    return properties(checkpoint.served, name, network, training, metrics)
+    return properties(checkpoint.served, name, network, training)
 
 
 def training_record(checkpoint: Checkpoint, weights: str) -> dict[str, Any]:
@@ -148,7 +145,6 @@ def properties(
     name: str,
     network: dict[str, Any],
     training: dict[str, Any],
-    metrics: dict[str, Any],
 ) -> dict[str, str]:
     """``metadata_props`` of any model, trained or not."""
     if len(served.datasets) > 1:
@@ -163,5 +159,4 @@ def properties(
         "papilla.sed_max_j_per_m3": repr(served.sed_max_j_per_m3),
         "papilla.dataset_sha256": served.dataset_sha256,
         "papilla.training": json.dumps(training),
-        "papilla.metrics": json.dumps(metrics),
     }

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import zipfile
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from papilla_trainer.errors import DatasetError
 
 
 def write_atomic(path: Path, data: bytes) -> None:
@@ -33,3 +39,12 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ValueError(f"{path} holds no JSON object")
     return value
+
+
+def read_npz(path: Path) -> dict[str, NDArray[Any]]:
+    """All arrays of an archive."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {key: archive[key] for key in archive.files}
+    except (ValueError, OSError, zipfile.BadZipFile) as error:
+        raise DatasetError(f"{path}: not a readable .npz ({error})") from error

@@ -13,9 +13,10 @@ from collections.abc import Callable
 import torch
 from torch import Tensor, nn
 
-from papilla_trainer.metrics import FAR_FIELD_FRACTION
-
 LOSSES = ("mse", "relative")
+
+# The far field is where SED is below this part of a sample's maximum.
+_FAR_FIELD = 0.1
 
 Loss = Callable[[Tensor, Tensor], Tensor]
 
@@ -42,7 +43,7 @@ def relative_loss(output: Tensor, target: Tensor, weights: Tensor, far_weight: f
     squared = weights * (output - target) ** 2
     norm = (weights * target**2).sum(dim=1)
     peak = (target * (weights > 0)).amax(dim=1, keepdim=True)
-    far = weights * (target < FAR_FIELD_FRACTION * peak)
+    far = weights * (target < _FAR_FIELD * peak)
     far_norm = (far * target**2).sum(dim=1) + _FAR_FLOOR * norm
     tiny = torch.finfo(target.dtype).tiny
     whole = squared.sum(dim=1) / norm.clamp_min(tiny)

@@ -32,7 +32,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from papilla_trainer.errors import UsageError
-from papilla_trainer.raster import SIDE_PX
+from papilla_trainer.maps import SIDE_PX
 
 PRESSURE_UNIT_PA = 1e4
 SED_UNIT_J_PER_M3 = 100.0

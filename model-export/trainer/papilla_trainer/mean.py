@@ -17,9 +17,8 @@ from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import DatasetError, RunError
-from papilla_trainer.evaluation import measure, predict, served_model
 from papilla_trainer.export import properties, to_onnx, training_record, write_model
-from papilla_trainer.metrics import relative_l2
+from papilla_trainer.serving import predict, served_model
 
 
 class MeanModel(nn.Module):
@@ -61,12 +60,11 @@ def correction(model: nn.Module, finer: Dataset) -> Correction:
 
     The median of them decides, so that no single one does.
     """
-    maps = finer.load(finer.train_ids + finer.test_ids)
-    inside = finer.interface.mask() > 0
+    inside = finer.mask() > 0
     pairs = []
-    for pressure, truth in zip(maps.pressure_pa, maps.sed_j_per_m3, strict=True):
-        t = truth[inside].astype(np.float64)
-        p = predict(model, pressure[None])[0][inside].astype(np.float64)
+    for state in finer.states(finer.train_ids + finer.test_ids):
+        t = state.sed_j_per_m3[inside].astype(np.float64)
+        p = predict(model, state.pressure_pa[None].copy())[0][inside].astype(np.float64)
         if t.any() and p.any():
             pairs.append((p, t))
     if len(pairs) < 2:
@@ -75,7 +73,10 @@ def correction(model: nn.Module, finer: Dataset) -> Correction:
     others = [float(np.median(np.delete(factors, i))) for i in range(len(pairs))]
 
     def spread(by: list[float]) -> dict[str, float]:
-        errors = [relative_l2(f * p, t) for f, (p, t) in zip(by, pairs, strict=True)]
+        errors = [
+            float(np.linalg.norm(f * p - t) / np.linalg.norm(t))
+            for f, (p, t) in zip(by, pairs, strict=True)
+        ]
         return {"median": float(np.median(errors)), "p95": float(np.percentile(errors, 95.0))}
 
     return Correction(
@@ -100,7 +101,7 @@ def mean_record(runs: list[dict[str, Any]], finer: Correction | None = None) -> 
 def write_mean(
     run_dirs: list[Path], dataset: Dataset, finer: Dataset | None, out: Path, name: str | None
 ) -> dict[str, Any]:
-    """Write the mean of the runs' networks to ``out``; returns its test errors.
+    """Write the mean of the runs' networks to ``out``.
 
     All of them must have learnt ``dataset``; ``finer`` puts the mean right, see `correction`.
     """
@@ -114,14 +115,13 @@ def write_mean(
         raise DatasetError(f"{finer.directory}: of another atlas than {dataset.directory}")
     found = finer and correction(mean_model(checkpoints), finer)
     model = mean_model(checkpoints, found.factor if found else 1.0)
-    metrics, _ = measure(model, dataset)
     network = {
         "kind": "mean",
         "of": [TrainConfig(**checkpoint.config).spec.as_json() for checkpoint in checkpoints],
     }
     runs = [training_record(checkpoint, "best") for checkpoint in checkpoints]
     training = mean_record(runs, found)
-    props = properties(checkpoints[0].served, name or out.stem, network, training, metrics)
+    props = properties(checkpoints[0].served, name or out.stem, network, training)
     write_model(to_onnx(model), props, out)
-    result = {"model": str(out), "bytes": out.stat().st_size, "metrics": metrics}
+    result: dict[str, Any] = {"model": str(out), "bytes": out.stat().st_size}
     return {**result, "finer": training["finer"]} if found else result

@@ -1,4 +1,4 @@
-"""What a run leaves for people: loss curves (CSV, PNG) and a table of held-out errors."""
+"""What a run leaves for people: its losses as CSV and as a picture."""
 
 from __future__ import annotations
 
@@ -48,16 +48,3 @@ def plot_history(run_dir: Path, history: list[dict[str, float]], title: str, bes
     picture = io.BytesIO()
     figure.savefig(picture, format="png")
     write_atomic(run_dir / PLOT_FILE, picture.getvalue())
-
-
-def metrics_table(summary: dict[str, dict[str, float]]) -> str:
-    """The held-out errors as aligned text, in percent (SSIM as it is)."""
-    lines = [f"{'metric':<24}{'median':>10}{'bad end':>18}"]
-    for name, values in summary.items():
-        (tail, bad) = next((k, v) for k, v in values.items() if k != "median")
-        if name == "ssim":
-            cells = f"{values['median']:>10.4f}{bad:>13.4f} ({tail})"
-        else:
-            cells = f"{100 * values['median']:>9.2f}%{100 * bad:>12.2f}% ({tail})"
-        lines.append(f"{name:<24}{cells}")
-    return "\n".join(lines)

@@ -2,44 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from papilla_trainer.comparison.unet import NetworkSpec, S1UNet, build_network
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.contact_maps import with_contact
-from papilla_trainer.dataset import Dataset, Maps
+from papilla_trainer.dataset import Dataset, State
 from papilla_trainer.joined import STRIDE
 from papilla_trainer.losses import Loss, make_loss
 from papilla_trainer.map_network import MapNet, MapSpec
 
 
-@dataclass(frozen=True)
 class Samples:
-    """On the device: maps ``[N, 1, 224, 224]``, in Pa and J/m3.
+    """What is trained on: maps ``[N, 1, 224, 224]``, in Pa and J/m3, taken a batch at a time.
 
-    The U-Net's are divided by the dataset's maxima, as in its paper. ``source`` ``[N]``, on the
-    CPU, says which dataset each is of; with contact's pressure it counts as another.
+    On a CPU they stay where they are on disk, mapped into memory; another device gets all of them
+    at once. The U-Net's are divided by the dataset's maxima, as in its paper. ``source`` ``[N]``
+    says which dataset each is of; with contact's pressure it counts as another.
     """
 
-    inputs: Tensor
-    targets: Tensor
-    source: Tensor
-
-    @staticmethod
-    def of(maps: Maps, device: torch.device, units: tuple[float, float] = (1.0, 1.0)) -> Samples:
+    def __init__(
+        self,
+        states: list[State],
+        device: torch.device,
+        units: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
         """Maps in units of so many Pa and J/m3."""
-        inputs = torch.from_numpy(maps.pressure_pa).unsqueeze(1).mul_(1 / units[0])
-        targets = torch.from_numpy(maps.sed_j_per_m3).unsqueeze(1).mul_(1 / units[1])
-        return Samples(inputs.to(device), targets.to(device), source_of(maps.press_id))
+        self.source = torch.tensor([state.press_id // STRIDE for state in states])
+        self._states, self._units = states, units
+        self._held = None
+        if device.type != "cpu":
+            inputs, targets = self._read(range(len(states)))
+            self._held = inputs.to(device), targets.to(device)
 
     def __len__(self) -> int:
-        return self.inputs.shape[0]
+        return len(self._states)
+
+    def batch(self, chosen: Tensor) -> tuple[Tensor, Tensor]:
+        """Inputs and targets of the samples chosen, on the device."""
+        if self._held is None:
+            return self._read(chosen.tolist())
+        inputs, targets = self._held
+        chosen = chosen.to(inputs.device)
+        return inputs[chosen], targets[chosen]
+
+    def _read(self, rows: Iterable[int]) -> tuple[Tensor, Tensor]:
+        states = [self._states[row] for row in rows]
+        maps = ([s.pressure_pa for s in states], [s.sed_j_per_m3 for s in states])
+        inputs, targets = (
+            torch.from_numpy(np.stack(of)).unsqueeze(1).mul_(1 / unit)
+            for of, unit in zip(maps, self._units, strict=True)
+        )
+        return inputs, targets
 
 
 @dataclass(frozen=True)
@@ -60,17 +79,16 @@ def make_task(
     device: torch.device,
 ) -> Task:
     """Load the indentations named, and no others, and build the network."""
-    spec = config.spec
-    load = _loader(spec)
-    if config.contact:
-        maps = dataset.load(fit_ids)
-        fit = Samples.of(with_contact(maps, dataset, config.contact), device)
-        fit.source[len(maps) :] += len(dataset.hashes)
-    else:
-        fit = load(dataset, fit_ids, device)
-    validation = load(dataset, validation_ids, device) if validation_ids else None
+    spec, units = config.spec, (1.0, 1.0)
+    if isinstance(spec, NetworkSpec):
+        units = (dataset.pressure_max_pa, dataset.sed_max_j_per_m3)
+    states = dataset.states(fit_ids)
+    fit = Samples(with_contact(states, dataset, config.contact), device, units)
+    fit.source[len(states) :] += len(dataset.hashes)
+    aside = dataset.states(validation_ids)
+    validation = Samples(aside, device, units) if aside else None
     network = fresh_network(spec, config.seed).to(memory_format=torch.channels_last)
-    weights = torch.from_numpy(dataset.interface.mask())
+    weights = torch.from_numpy(dataset.mask())
     loss = make_loss(config.loss_name, weights.to(device), config.far_weight)
     return Task(network.to(device), fit, validation, loss)
 
@@ -84,30 +102,8 @@ def fresh_network(spec: NetworkSpec | MapSpec, seed: int) -> nn.Module:
         return MapNet(spec)
 
 
-def trained_network(
-    spec: NetworkSpec | MapSpec, weights: dict[str, Tensor]
-) -> nn.Module:
+def trained_network(spec: NetworkSpec | MapSpec, weights: dict[str, Tensor]) -> nn.Module:
     """A network that holds these weights."""
     network: nn.Module = MapNet(spec) if isinstance(spec, MapSpec) else S1UNet(spec.base)
     network.load_state_dict(weights)
     return network
-
-
-def _loader(
-    spec: NetworkSpec | MapSpec,
-) -> Callable[[Dataset, list[int], torch.device], Samples]:
-    return _load_normalised if isinstance(spec, NetworkSpec) else _load_maps
-
-
-def _load_normalised(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
-    units = (dataset.pressure_max_pa, dataset.sed_max_j_per_m3)
-    return Samples.of(dataset.load(ids), device, units)
-
-
-def _load_maps(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
-    return Samples.of(dataset.load(ids), device)
-
-
-def source_of(press_id: NDArray[np.int64]) -> Tensor:
-    """``[N]``: the dataset, of those joined, that each press is of."""
-    return torch.from_numpy(press_id // STRIDE)

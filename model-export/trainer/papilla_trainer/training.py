@@ -109,8 +109,7 @@ class Trainer:
         # By seed and epoch alone, so a resumed run sees the same samples.
         generator = torch.Generator().manual_seed(self.config.seed * 1_000_003 + epoch)
         for chosen in self._batches(generator):
-            inputs = self.fit_samples.inputs[chosen]
-            targets = self.fit_samples.targets[chosen]
+            inputs, targets = self.fit_samples.batch(chosen)
             if self.on_pixels:
                 inputs, targets = varied(inputs, targets, self.config.shift_px, generator)
             self.optimizer.zero_grad()
@@ -132,7 +131,7 @@ class Trainer:
 
     def _batches(self, generator: torch.Generator) -> tuple[Tensor, ...]:
         order = draw(self.fit_samples.source, self.config.dataset_samples, generator)
-        return order.to(self.device).split(self.config.batch)
+        return order.split(self.config.batch)
 
     def _forward(self, inputs: Tensor) -> Tensor:
         bf16 = self.config.precision == "bf16"
@@ -147,8 +146,8 @@ class Trainer:
         self.network.eval()
         total = 0.0
         for chosen in torch.arange(len(self.validation)).split(self.config.batch):
-            output = self._forward(self.validation.inputs[chosen])
-            loss = self.loss(output, self.validation.targets[chosen])
+            inputs, targets = self.validation.batch(chosen)
+            loss = self.loss(self._forward(inputs), targets)
             total += loss.item() * len(chosen)
         return total / len(self.validation)
 

@@ -1,7 +1,13 @@
-"""Shared fixtures: a tiny made-up dataset, a short finished run, and the shipped dataset."""
+"""Shared fixtures: a tiny made-up dataset, a short finished run, and a shipped dataset.
+
+Maps of shipped datasets are drawn by the real fe-datagen: FE_DATAGEN names it, else it is the one
+that `cargo build` left in target.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,10 +16,30 @@ from tiny_dataset import write_tiny_dataset, write_tiny_operator
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
-from papilla_trainer.evaluation import evaluate_run
+from papilla_trainer.maps import FOLDER_VARIABLE, PROGRAM_VARIABLE
 from papilla_trainer.training import Trainer
 
 REPOSITORY = Path(__file__).resolve().parents[3]
+
+
+def program(name: str) -> str:
+    """A program of this repository that is built."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
+    built = [target / profile / name for profile in ("release", "debug")]
+    found = sorted((p for p in built if p.is_file()), key=lambda p: p.stat().st_mtime)
+    assert found, f"no {name} in {target}: cargo build --bin {name}"
+    return str(found[-1])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Where the tests' maps are kept, in place of the user's cache."""
+    folder = tmp_path_factory.mktemp("store")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(FOLDER_VARIABLE, str(folder))
+        if PROGRAM_VARIABLE not in os.environ:
+            patch.setenv(PROGRAM_VARIABLE, program("fe-datagen"))
+        yield folder
 
 
 @pytest.fixture(scope="session")
@@ -36,10 +62,9 @@ def config() -> TrainConfig:
 
 @pytest.fixture(scope="session")
 def run_dir(tiny: Dataset, config: TrainConfig, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished, measured, uninterrupted run on the tiny dataset."""
+    """A finished, uninterrupted run on the tiny dataset."""
     directory = tmp_path_factory.mktemp("run") / "straight"
     Trainer(tiny, config, directory).fit()
-    evaluate_run(directory, tiny)
     return directory
 
 
@@ -51,7 +76,5 @@ def finished(run_dir: Path) -> Checkpoint:
 
 @pytest.fixture(scope="session")
 def shipped() -> Dataset:
-    """The finite-element dataset that the repository ships."""
-    manifests = sorted((REPOSITORY / "data").glob("*/manifest.json"))
-    assert manifests, "no dataset under data/"
-    return Dataset(manifests[0].parent)
+    """A small one of the finite-element datasets that the repository ships."""
+    return Dataset(REPOSITORY / "data" / "final-anew")

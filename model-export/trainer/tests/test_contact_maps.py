@@ -38,24 +38,24 @@ def test_a_pressure_goes_with_the_sed_of_its_own_state(tmp_path: Path) -> None:
     first, last = parts[1].train_ids[0], parts[1].train_ids[-1]
     held_out = parts[1].test_ids[0]
     file = write(tmp_path / "c.npz", parts[1], [last, held_out, first], [2, 1, 0])
-    maps = joined.load(joined.train_ids)
-    found = with_contact(maps, joined, [file])
+    states = joined.states(joined.train_ids)
+    found = with_contact(states, joined, [file])
     # The held-out press is not asked for, so it is not learnt.
-    assert len(found) == len(maps) + 2
-    assert found.press_id[-2:].tolist() == [STRIDE + last, STRIDE + first]
-    assert found.pressure_pa[-2:, 0, 0].tolist() == [1.0, 3.0]
+    assert len(found) == len(states) + 2
+    assert [state.press_id for state in found[-2:]] == [STRIDE + last, STRIDE + first]
+    assert [state.pressure_pa[0, 0] for state in found[-2:]] == [1.0, 3.0]
     truth = joined.load([STRIDE + last, STRIDE + first]).sed_j_per_m3
-    assert np.array_equal(found.sed_j_per_m3[-2:], truth[[2, 3]])
-    assert np.array_equal(found.pressure_pa[: len(maps)], maps.pressure_pa)
+    assert np.array_equal([state.sed_j_per_m3 for state in found[-2:]], truth[[2, 3]])
+    assert all(a is b for a, b in zip(found, states, strict=False))
 
 
 def test_a_file_of_another_dataset_is_refused(tiny: Dataset, tmp_path: Path) -> None:
     other = Dataset(write_tiny_dataset(tmp_path / "other", seed=9))
     file = write(tmp_path / "c.npz", other, other.train_ids[:1], [0])
     with pytest.raises(DatasetError, match="not trained on"):
-        with_contact(tiny.load(tiny.train_ids), tiny, [file])
-    with pytest.raises(DatasetError, match="No such file"):
-        with_contact(tiny.load(tiny.train_ids), tiny, [str(tmp_path / "none.npz")])
+        with_contact(tiny.states(tiny.train_ids), tiny, [file])
+    with pytest.raises(DatasetError, match="not a readable"):
+        with_contact(tiny.states(tiny.train_ids), tiny, [str(tmp_path / "none.npz")])
     with pytest.raises(UsageError, match="--contact"):
         TrainConfig(network="s1-base4", contact=[file])
 

@@ -77,11 +77,11 @@ def test_untrained_models_from_the_command_line(
     half_space, operator = str(tmp_path / "half-space.onnx"), str(tmp_path / "fe-operator.onnx")
     shape = ["--rank", "8", "--near", "5", "--json"]
     assert main(["half-space", "--dataset", data, "--onnx", half_space, *shape]) == 0
-    ours = json.loads(capsys.readouterr().out)["metrics"]
     assert (
         main(["operator", str(operator_file), "--dataset", data, "--onnx", operator, *shape]) == 0
     )
-    assert json.loads(capsys.readouterr().out)["metrics"] != ours
+    assert Path(half_space).read_bytes() != Path(operator).read_bytes()
+    capsys.readouterr()
     for model in (half_space, operator):
         assert main(["check", model, "--dataset", data, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["zero_gives_zero"] is True

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tiny_dataset
 import torch
 
 from papilla_trainer.comparison.atlas import Atlas
@@ -14,10 +15,12 @@ from papilla_trainer.comparison.compression import start_from_operator
 from papilla_trainer.comparison.layout import Layout, frames
 from papilla_trainer.comparison.linear_network import LinearNet, LinearSpec
 from papilla_trainer.comparison.linear_operator import Operator
+from papilla_trainer.comparison.raster import Raster
+from papilla_trainer.comparison.sampling import vertex_sampler
+from papilla_trainer.comparison.untrained import vertex_pressures
 from papilla_trainer.comparison.vertex_served import MapFrame, ServedVertexModel
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import DatasetError
-from papilla_trainer.sampling import vertex_sampler
 
 SPECS = (LinearSpec(8, 0, "test"), LinearSpec(8, 12, "test"))
 
@@ -32,6 +35,20 @@ def operator(operator_file: Path, atlas: Atlas) -> Operator:
     return Operator.read(operator_file, atlas)
 
 
+@pytest.fixture(scope="module")
+def skin(tiny: Dataset) -> Raster:
+    return Raster.read(tiny.directory, "skin", tiny.vertex_count)
+
+
+@pytest.fixture(scope="module")
+def interface(tiny: Dataset) -> Raster:
+    return Raster.read(tiny.directory, "interface", tiny.vertex_count)
+
+
+def drawn(values: np.ndarray, raster: Raster) -> np.ndarray:
+    return tiny_dataset.drawn(values, raster.pixel, raster.vertex, raster.weight)
+
+
 def build(spec: LinearSpec, atlas: Atlas, operator: Operator) -> LinearNet:
     torch.manual_seed(3)
     network = LinearNet(spec, Layout.of(atlas, operator, spec.near))
@@ -43,7 +60,7 @@ def build(spec: LinearSpec, atlas: Atlas, operator: Operator) -> LinearNet:
 
 def started(spec: LinearSpec, tiny: Dataset, atlas: Atlas, operator: Operator) -> LinearNet:
     network = LinearNet(spec, Layout.of(atlas, operator, spec.near))
-    pressure = torch.from_numpy(tiny.vertex_pressures(tiny.train_ids))
+    pressure = torch.from_numpy(tiny_dataset.vertex_pressures(tiny.directory, tiny.train_ids))
     start_from_operator(network, atlas, operator, pressure, torch.ones(atlas.vertex_count))
     return network
 
@@ -87,15 +104,20 @@ def test_sed_is_quadratic(atlas: Atlas, operator: Operator) -> None:
         torch.testing.assert_close(network(3.0 * pressure), 9.0 * network(pressure))
 
 
-def test_the_sampler_inverts_the_rasteriser(tiny: Dataset) -> None:
-    pixels, weights = vertex_sampler(tiny.skin, tiny.vertex_count)
+def test_the_sampler_inverts_the_raster(tiny: Dataset, skin: Raster, interface: Raster) -> None:
+    pixels, weights = vertex_sampler(skin, tiny.vertex_count)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-9)
     assert np.abs(weights).sum(axis=1).max() < 3.0  # noise is not blown up
-    values = tiny.vertex_pressures(tiny.test_ids)
-    maps = tiny.skin.rasterise(values).reshape(len(values), -1)
+    values = tiny_dataset.vertex_pressures(tiny.directory, tiny.test_ids)
+    maps = drawn(values, skin).reshape(len(values), -1)
     back = (maps[:, pixels] * weights).sum(axis=2)
     error = np.linalg.norm(back - values, axis=1) / np.linalg.norm(values, axis=1)
     assert error.max() < 2e-3
+    # So a model is told the pressures of the training states.
+    frame = MapFrame.of(skin, interface, tiny.vertex_count)
+    told = vertex_pressures(tiny, frame).numpy()
+    values = tiny_dataset.vertex_pressures(tiny.directory, tiny.train_ids)
+    assert np.linalg.norm(told - values) < 2e-3 * np.linalg.norm(values)
     # Any smooth map, not only rasterised ones: near its own value at the vertex.
     rows, columns = np.divmod(np.arange(224 * 224), 224)
     wave = 2.0 + np.sin(columns / 40.0) * np.cos(rows / 30.0)
@@ -103,24 +125,26 @@ def test_the_sampler_inverts_the_rasteriser(tiny: Dataset) -> None:
     assert np.abs((wave[pixels] * weights).sum(axis=1) - own).max() < 0.1
 
 
-def test_the_frame_draws_what_the_rasteriser_draws(tiny: Dataset) -> None:
-    frame = MapFrame.of(tiny.skin, tiny.interface, tiny.vertex_count)
-    values = tiny.vertex_pressures(tiny.test_ids[:1])[:1]
-    drawn = frame.draw(torch.from_numpy(values)).numpy()[0]
-    np.testing.assert_allclose(drawn, tiny.interface.rasterise(values), atol=1e-5 * values.max())
-    assert not drawn[0][tiny.interface.mask() == 0].any()
+def test_the_frame_draws_what_the_raster_says(
+    tiny: Dataset, skin: Raster, interface: Raster
+) -> None:
+    frame = MapFrame.of(skin, interface, tiny.vertex_count)
+    values = tiny_dataset.vertex_pressures(tiny.directory, tiny.test_ids[:1])[:1]
+    found = frame.draw(torch.from_numpy(values)).numpy()[0]
+    np.testing.assert_allclose(found, drawn(values, interface), atol=1e-5 * values.max())
+    assert not found[0][tiny.mask() == 0].any()
 
 
 def test_served_maps_are_the_networks_vertex_values(
-    tiny: Dataset, atlas: Atlas, operator: Operator
+    tiny: Dataset, atlas: Atlas, operator: Operator, skin: Raster, interface: Raster
 ) -> None:
     network = build(SPECS[1], atlas, operator)
-    frame = MapFrame.of(tiny.skin, tiny.interface, tiny.vertex_count)
-    pressure = tiny.vertex_pressures(tiny.test_ids)
-    maps = torch.from_numpy(tiny.skin.rasterise(pressure))[:, None]
+    frame = MapFrame.of(skin, interface, tiny.vertex_count)
+    pressure = tiny_dataset.vertex_pressures(tiny.directory, tiny.test_ids)
+    maps = torch.from_numpy(drawn(pressure, skin))[:, None]
     with torch.no_grad():
         served = ServedVertexModel(network, frame)(maps)[:, 0].numpy()
-        expected = tiny.interface.rasterise(network(torch.from_numpy(pressure)).numpy())
+        expected = drawn(network(torch.from_numpy(pressure)).numpy(), interface)
     # What sampling the map loses is all that may differ.
     assert np.linalg.norm(served - expected) < 3e-3 * np.linalg.norm(expected)
 

@@ -12,6 +12,7 @@ import onnx
 import onnxruntime
 import pytest
 import torch
+from conftest import REPOSITORY, program
 from tiny_dataset import write_tiny_dataset
 
 from papilla_trainer.check import check_model
@@ -20,7 +21,6 @@ from papilla_trainer.cli import main
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import DatasetError, RunError, UsageError
-from papilla_trainer.evaluation import evaluate_run
 from papilla_trainer.export import export_run
 from papilla_trainer.joined import STRIDE, open_datasets
 from papilla_trainer.losses import relative_loss
@@ -44,7 +44,6 @@ def on_maps() -> TrainConfig:
 def run_dir(tiny: Dataset, on_maps: TrainConfig, tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("maps") / "run"
     Trainer(tiny, on_maps, directory).fit()
-    evaluate_run(directory, tiny)
     return directory
 
 
@@ -68,13 +67,13 @@ def test_only_training_presses_are_loaded(
     tiny: Dataset, on_maps: TrainConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded: list[int] = []
-    load = tiny.load
+    states = tiny.states
 
     def spy(ids: list[int]) -> object:
         loaded.extend(ids)
-        return load(ids)
+        return states(ids)
 
-    monkeypatch.setattr(tiny, "load", spy)
+    monkeypatch.setattr(tiny, "states", spy)
     Trainer(tiny, replace(on_maps, epochs=1), tmp_path / "all").fit()
     assert sorted(loaded) == sorted(tiny.train_ids)
     loaded.clear()
@@ -119,9 +118,10 @@ def test_two_datasets_are_one(
     other = Dataset(second)
     joined = hashlib.sha256((tiny.dataset_sha256 + other.dataset_sha256).encode())
     assert both.dataset_sha256 == joined.hexdigest()
-    pressure = both.vertex_pressures([STRIDE + 3, 1])
-    np.testing.assert_array_equal(pressure[:6], other.vertex_pressures([3]))
-    np.testing.assert_array_equal(pressure[6:], tiny.vertex_pressures([1]))
+    maps = both.load([STRIDE + 3, 1])
+    np.testing.assert_array_equal(maps.pressure_pa[:6], other.load([3]).pressure_pa)
+    np.testing.assert_array_equal(maps.pressure_pa[6:], tiny.load([1]).pressure_pa)
+    assert maps.press_id.tolist() == [STRIDE + 3] * 6 + [1] * 6
     with pytest.raises(DatasetError, match="twice"):
         open_datasets([second, second])
     run, model = str(tmp_path / "run"), str(tmp_path / "model.onnx")
@@ -158,28 +158,31 @@ def test_large_constants_are_stored_small_and_lose_nothing(
 
 
 def test_a_learning_curve_grows_and_goes_on(
-    tiny: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    shipped: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_tiny_dataset(tmp_path / "other", seed=9)
+    other = Dataset(REPOSITORY / "data" / "final")
     out = tmp_path / "curve"
-    arguments = ["curve", "--json", "--dataset", str(tiny.directory), "--judge"]
-    arguments += [str(tmp_path / "other"), "--network", "map-c2-k3-r4", "--threads", "1"]
-    arguments += ["--epochs", "2", "--out", str(out)]
+    arguments = ["curve", "--json", "--dataset", str(shipped.directory), "--judge"]
+    arguments += [str(other.directory), "--network", "map-c2-k3-r4", "--threads", "1"]
+    arguments += ["--epochs", "2", "--out", str(out), "--model-export", program("model-export")]
     arguments += ["--validation-presses", "1", "--presses", "4", "2"]
     assert main(arguments) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
-    assert [(row["presses"], row["epochs"]) for row in rows[::2]] == [(2, 4), (4, 2)]
-    assert {row["judged_on"] for row in rows} == {f"{tiny.directory.name}, held out", "other"}
+    # As many steps on two presses as on the five that there are.
+    assert [(row["presses"], row["epochs"]) for row in rows[::2]] == [(2, 5), (4, 3)]
+    assert {row["judged_on"] for row in rows} == {"final-anew, held out", "final"}
+    assert all(0.0 < row["relative_l2_median"] < 2.0 for row in rows)
     small, large = (set(Checkpoint.load(out / f"presses-{n}").splits["fit"]) for n in (2, 4))
     assert small < large
     assert (out / "curve.svg").read_text(encoding="utf-8").count("<path") > 5
     # A second time nothing is trained, and the figures are the same.
-    before = (out / "presses-4" / "checkpoint.pt").stat().st_mtime_ns
-    assert main(arguments) == 0
-    assert json.loads(capsys.readouterr().out)["rows"] == rows
-    assert (out / "presses-4" / "checkpoint.pt").stat().st_mtime_ns == before
+    before = (out / "presses-2" / "checkpoint.pt").stat().st_mtime_ns
+    assert main([*arguments[:-2], "2"]) == 0
+    again = json.loads(capsys.readouterr().out)["rows"]
+    assert [{**row, "seconds": 0} for row in again] == [{**row, "seconds": 0} for row in rows[:2]]
+    assert (out / "presses-2" / "checkpoint.pt").stat().st_mtime_ns == before
     # What is trained on does not judge.
-    arguments[5] = str(tiny.directory)
+    arguments[5] = str(shipped.directory)
     assert main(arguments) == 2
 
 

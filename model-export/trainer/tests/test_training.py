@@ -108,13 +108,13 @@ def test_training_never_sees_a_test_press(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     loaded: list[int] = []
-    load = tiny.load
+    states = tiny.states
 
     def spy(ids: list[int]) -> object:
         loaded.extend(ids)
-        return load(ids)
+        return states(ids)
 
-    monkeypatch.setattr(tiny, "load", spy)
+    monkeypatch.setattr(tiny, "states", spy)
     Trainer(tiny, dataclasses.replace(config, epochs=1), tmp_path / "run").fit()
     assert sorted(loaded) == sorted(tiny.train_ids)
     assert finished.splits["test"] == tiny.test_ids

@@ -1,4 +1,4 @@
-"""A tiny dataset in the real format, for tests of the trainer's mechanics.
+"""A tiny dataset in the real format, for tests of the trainer's mechanics, with its maps.
 
 Not finite elements: smooth made-up bumps on a grid of triangles. No figure from it means anything.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +18,21 @@ COLUMNS, ROWS = 9, 12
 
 
 def write_tiny_dataset(directory: Path, presses: int = 6, depths: int = 6, seed: int = 1) -> Path:
-    """Write manifest, rasters and shards; every fifth (from the third) is for testing."""
+    """Write manifest, rasters, shards and maps; every fifth (from the third) is for testing."""
     (directory / "shards").mkdir(parents=True)
     random = np.random.default_rng(seed)
     skin, triangles = _grid(16.0, 208.0)
     interface, _ = _grid(30.3, 193.1)
     arrays: dict[str, np.ndarray] = {}
+    rasters = {}
     for name, uv in (("skin", skin), ("interface", interface)):
-        pixel, vertex, weight = _raster(uv, triangles)
+        pixel, vertex, weight = rasters[name] = _raster(uv, triangles)
         arrays |= {f"{name}_pixel": pixel, f"{name}_vertex": vertex, f"{name}_weight": weight}
     np.savez_compressed(directory / "raster.npz", **arrays)
-    entries, pressure_max, sed_max = [], 0.0, 0.0
+    entries, shards, pressure_max, sed_max = [], [], 0.0, 0.0
     for i in range(presses):
         shard = _press(skin, random, depths)
+        shards.append(shard)
         pressure_max = max(pressure_max, float(shard["pressure_pa"].max()))
         sed_max = max(sed_max, float(shard["sed_dermis_j_per_m3"].max()))
         buffer = io.BytesIO()
@@ -71,7 +74,49 @@ def write_tiny_dataset(directory: Path, presses: int = 6, depths: int = 6, seed:
     (directory / "manifest.json").write_text(json.dumps(manifest))
     atlas = tiny_atlas(manifest["atlas_hash"], skin, interface, triangles)
     (directory / "atlas.json").write_text(json.dumps(atlas))
+    _write_maps(directory, shards, rasters)
     return directory
+
+
+def _write_maps(directory: Path, shards: list[dict[str, np.ndarray]], rasters: dict) -> None:
+    """As ``fe-datagen dataset maps`` does, into the folder where maps are kept."""
+    text = (directory / "manifest.json").read_bytes()
+    sha256 = hashlib.sha256(text).hexdigest()
+    folder = Path(os.environ["PAPILLA_MAPS"]) / f"{sha256[:16]}-1"
+    folder.mkdir(exist_ok=True)
+    depths = len(shards[0]["depth_mm"])
+    arrays = {
+        "pressure_pa": drawn(_values(shards, "pressure_pa"), *rasters["skin"]),
+        "sed_j_per_m3": drawn(_values(shards, "sed_dermis_j_per_m3"), *rasters["interface"]),
+        "press": np.repeat(np.arange(len(shards)), depths),
+        "state": np.tile(np.arange(depths), len(shards)),
+        "depth_mm": np.concatenate([shard["depth_mm"] for shard in shards]),
+    }
+    for patch, (pixel, _, _) in rasters.items():
+        arrays[patch] = np.isin(np.arange(SIDE**2), pixel).reshape(SIDE, SIDE)
+    for name, array in arrays.items():
+        np.save(folder / f"{name}.npy", array)
+    about = {"format": 1, "manifest_sha256": sha256, "states": len(arrays["press"])}
+    (folder / "maps.json").write_text(json.dumps(about))
+
+
+def _values(shards: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
+    return np.concatenate([shard[name] for shard in shards])
+
+
+def vertex_pressures(directory: Path, ids: list[int]) -> np.ndarray:
+    """``[N, V]``: what the shards hold."""
+    shards = [np.load(directory / f"shards/press-{i:05}.npz") for i in ids]
+    return _values(shards, "pressure_pa")
+
+
+def drawn(
+    values: np.ndarray, pixel: np.ndarray, vertex: np.ndarray, weight: np.ndarray
+) -> np.ndarray:
+    """Values ``[N, V]`` at the vertices as maps ``[N, 224, 224]``, linear in each triangle."""
+    maps = np.zeros((len(values), SIDE * SIDE), dtype=np.float32)
+    maps[:, pixel] = (values[:, vertex] * weight).sum(axis=2)
+    return maps.reshape(-1, SIDE, SIDE)
 
 
 def tiny_atlas(

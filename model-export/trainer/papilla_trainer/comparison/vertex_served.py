@@ -9,8 +9,9 @@ import torch
 from torch import Tensor, nn
 
 from papilla_trainer.comparison.linear_network import LinearNet
-from papilla_trainer.raster import MAP_LEN, SIDE_PX, Raster
-from papilla_trainer.sampling import vertex_sampler
+from papilla_trainer.comparison.raster import Raster
+from papilla_trainer.comparison.sampling import vertex_sampler
+from papilla_trainer.maps import MAP_LEN, SIDE_PX
 
 
 class MapFrame(nn.Module):
@@ -34,7 +35,7 @@ class MapFrame(nn.Module):
 
     @staticmethod
     def of(skin: Raster, interface: Raster, vertex_count: int) -> MapFrame:
-        """The frame of a dataset's rasters."""
+        """The frame of two rasters."""
         pixel, weight = vertex_sampler(skin, vertex_count)
         corner, triangle = np.unique(interface.vertex, axis=0, return_inverse=True)
         of_pixel = np.zeros(MAP_LEN, dtype=np.int64)

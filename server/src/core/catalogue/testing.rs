@@ -23,7 +23,6 @@ pub(crate) fn info(name: &str) -> ModelInfo {
         sed_max_j_per_m3: 100.0,
         dataset_sha256: String::new(),
         training: json!({}),
-        trainer_metrics: json!({}),
         backend: "test".to_owned(),
     }
 }

@@ -173,7 +173,7 @@ pub(crate) fn add_model_to_panic_over(folder: &Path, name: &str, atlas_hash: &st
 }
 
 /// What a model file says of itself.
-fn metadata(name: &str, atlas_hash: &str, work: usize) -> [(&'static str, String); 10] {
+fn metadata(name: &str, atlas_hash: &str, work: usize) -> [(&'static str, String); 9] {
     let network = json!({"kind": "test", "base": work}).to_string();
     [
         ("papilla.format", "1".to_owned()),
@@ -185,7 +185,6 @@ fn metadata(name: &str, atlas_hash: &str, work: usize) -> [(&'static str, String
         ("papilla.sed_max_j_per_m3", SED_MAX.to_string()),
         ("papilla.dataset_sha256", "0".repeat(64)),
         ("papilla.training", json!({"seed": 0}).to_string()),
-        ("papilla.metrics", json!({}).to_string()),
     ]
 }
 

@@ -1,4 +1,4 @@
-"""From a map back to vertex values: the local inverse of the rasteriser, with few pixels a vertex.
+"""From a map back to vertex values: the local inverse of the raster, with few pixels a vertex.
 
 A map is linear in each triangle, so the pixels about a vertex determine its value by least squares.
 Of all weights that do so, those of least norm are taken: they amplify noise least. Pixels that
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from papilla_trainer.raster import Raster
+from papilla_trainer.comparison.raster import Raster
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]
