@@ -7,7 +7,7 @@ using Papilla;
 static class Steady
 {
     const int Warm = 100, Frames = 900;
-    const string Ball = "{'input': 'objects', 'objects': [{'shape': {'shape': 'sphere', 'radius_mm': 10}}], 'pressure': 'vertices', 'answer_layout': 'vertices'}";
+    const string Ball = "{'input': 'objects', 'objects': [{'shape': {'shape': 'sphere', 'radius_mm': 10}}], 'pressure': 'vertices', 'answer_layout': 'vertices', 'shear': true, 'effects': ['spikes']}";
 
     static int Main(string[] arguments)
     {
@@ -19,19 +19,22 @@ static class Steady
         bool isContact = arguments.Length > 0 && arguments[0] == "contact";
         var pressurePa = new float[Wire.MapLength];
         for (int k = 0; k < 5000; k++) pressurePa[20000 + k] = 3000;
-        var poses = new[] { new Pose(11.25f, 0, -16.2f) };
+        // In turns, so that units fire.
+        var poses = new[] { new[] { new Pose(11.25f, 0, -16.2f) }, new[] { new Pose(11.25f, 0, -15.8f) } };
+        int turn = 0;
         var hello = isContact ? Hello.FromJson(JObject.Parse(Ball)) : new Hello { Tier = "half-space" };
         using (var session = new Session(Environment.GetEnvironmentVariable("PAPILLA_URL"), hello).Open())
         {
             session.WaitReady(20000);
-            return Run(session, () => isContact ? session.SendPoses(poses) : session.Send(pressurePa));
+            return Run(session, () => isContact ? session.SendPoses(poses[turn++ % 2]) : session.Send(pressurePa), isContact);
         }
     }
 
-    static int Run(Session session, Func<uint> send)
+    static int Run(Session session, Func<uint> send, bool isContact)
     {
         long before = 0;
         int collections = 0;
+        long spikes = 0, units = session.Ready.Json["units"] == null ? 0 : ((JArray)session.Ready.Json["units"]).Count;
         for (int k = 0; k < Warm + Frames; k++)
         {
             if (k == Warm)
@@ -43,10 +46,19 @@ static class Steady
             uint sequence = send();
             Answer answer = null;
             while (!session.TryTakeLatest(out answer)) Thread.Sleep(0);
+            if ((answer.Spikes != null) != isContact || (answer.ShearPa != null) != isContact) throw new Exception("spikes and shear are not as asked for");
+            for (int spike = 0; spike < answer.SpikeCount; spike++, spikes++)
+            {
+                // Of this frame and of the 65 ms before it.
+                long beforeUs = (long)answer.ClientTimeUs - answer.Spikes[spike].TimeUs;
+                if (beforeUs < 0 || beforeUs > 65535 || answer.Spikes[spike].Unit >= units) throw new Exception("spike " + spike + " is " + beforeUs + " us old");
+            }
+            if (isContact && answer.SpikesTotal != spikes) throw new Exception(answer.SpikesTotal + " spikes, " + spikes + " came");
             if (answer.Sequence != sequence || answer.Status != Status.Ok) throw new Exception("frame " + sequence + ": " + answer.Status);
         }
         long grown = GC.GetTotalMemory(false) - before;
         int collected = GC.CollectionCount(0) - collections;
+        if (isContact && spikes == 0) throw new Exception("no unit fired");
         Console.WriteLine("{0} bytes in {1} frames, {2} collections", grown, Frames, collected);
         // The heap is counted by blocks of some KiB; one object a frame would be 20 KiB.
         return collected == 0 && grown < 8192 ? 0 : 1;

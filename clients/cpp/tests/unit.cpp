@@ -105,6 +105,40 @@ static void messages() {
   CHECK(!core.waiting() && sequence == 1);
 }
 
+static void put_u32(std::uint8_t* at, std::uint32_t value) {
+  for (int k = 0; k < 4; ++k) at[k] = static_cast<std::uint8_t>(value >> 8 * k);
+}
+
+// Two spikes of a section with room for three, and the traction of two vertices.
+static void spikes_and_shear() {
+  papilla::Core core;
+  papilla::Answer got;
+  core.on_answer = [&](const papilla::Answer& answer) { got = answer; };
+  CHECK(core.text(R"({"type": "ready", "version": 3, "sample_type": "f32", "sections": [
+    {"name": "shear", "offset": 48, "bytes": 24}, {"name": "spikes", "offset": 72, "bytes": 20}]})") == papilla::Core::Event::ready);
+  const std::vector<float> map(papilla::map_len, 1.0F);
+  const auto answered = [&](std::uint32_t count) {
+    core.send(map.data(), {}, 100);
+    papilla::Outgoing* const frame = core.take();
+    std::vector<std::uint8_t> answer(frame->data(), frame->data() + 92);
+    std::fill(answer.begin() + 48, answer.end(), std::uint8_t(0));
+    answer[5] = 2;
+    put_u32(&answer[48 + 4], 0x3f800000);   // 1.0 Pa along y of the first vertex
+    put_u32(&answer[72], 7);
+    put_u32(&answer[76], count);
+    put_u32(&answer[80], 3 | 60u << 16);
+    put_u32(&answer[84], 5 | 65535u << 16);
+    return core.binary(answer.data(), answer.size());
+  };
+  CHECK(answered(2) != papilla::Core::Event::broken && got.status == papilla::Status::ok);
+  CHECK(got.shear_pa.size() == 6 && got.shear_pa[1] == 1.0F && got.shear_pa[0] == 0.0F);
+  CHECK(got.spikes.size() == 2 && got.spikes_total == 7);
+  CHECK(got.spikes[0].unit == 3 && got.spikes[0].time_us == 40);
+  CHECK(got.spikes[1].unit == 5 && got.spikes[1].time_us == 100 - 65535);
+  // More than the section holds are none.
+  CHECK(answered(4) == papilla::Core::Event::broken);
+}
+
 static void fingers() {
   // The newest frame of each finger leaves, in turns, at the place of the protocol.
   papilla::Core core("\"input\": \"objects\"");
@@ -192,6 +226,7 @@ int main() {
   halves();
   json();
   messages();
+  spikes_and_shear();
   fingers();
   places();
   proofs();

@@ -8,6 +8,13 @@ namespace Papilla
         internal NotCarriedException(string what, string why) : base("the answer carries no " + what + ": " + why) { }
     }
 
+    /// <summary>A unit fired: its number in ready's <c>units</c>, and when, by the client's clock.</summary>
+    public struct Spike
+    {
+        public ushort Unit;
+        public long TimeUs;
+    }
+
     /// <summary>
     /// What became of a frame. Its memory is made once and used again: copy what has to stay. <see cref="Map"/> and the
     /// other sections are those of a frame whose <see cref="Status"/> is Ok.
@@ -44,6 +51,13 @@ namespace Papilla
         public bool HasTouch;
         /// <summary>The pressure that was found (Pa), a map or a value a vertex; null where the hello does not ask for it.</summary>
         public float[] PressurePa;
+        /// <summary>The traction along the skin (Pa), x y z a vertex in the finger's frame; null where the hello does not ask for it.</summary>
+        public float[] ShearPa;
+        /// <summary>Who fired since the answer before, in the order of time: the first SpikeCount; null without the effect <c>spikes</c>.</summary>
+        public Spike[] Spikes;
+        public int SpikeCount;
+        /// <summary>Spikes of the finger since the hello, those too that no answer carried; modulo 2^32.</summary>
+        public uint SpikesTotal;
         /// <summary>SED at the atlas' vertices, J/m3; null where the hello does not ask for it in place of the map.</summary>
         public float[] Vertices;
         /// <summary>The finger of the frame.</summary>
@@ -111,6 +125,7 @@ namespace Papilla
                 PointRatesHz = Sized(PointRatesHz, terms.PointRatesCount);
                 Copy(m, terms.PointRatesAt, terms.PointRatesCount, bytes, PointRatesHz);
                 ReadRates(m, bytes, terms);
+                ReadSpikes(m, bytes, terms);
                 ActuatorCount = Copy(m, terms.ActuatorsAt, terms.ActuatorsCount, bytes, Actuators) ? terms.ActuatorsCount : 0;
                 HasMap = terms.MapAt >= 0;
                 if (HasMap) ReadMap(m, bytes, terms.MapAt);
@@ -136,6 +151,8 @@ namespace Papilla
             if (HasTouch) Touch = *(Touch*)(m + terms.TouchAt);
             PressurePa = Sized(PressurePa, terms.PressureCount);
             Copy(m, terms.PressureAt, terms.PressureCount, bytes, PressurePa);
+            ShearPa = Sized(ShearPa, terms.ShearCount);
+            Copy(m, terms.ShearAt, terms.ShearCount, bytes, ShearPa);
             var type = (SampleType)m[6];
             Vertices = Sized(Vertices, type > SampleType.U8 ? 0 : terms.VerticesBytes / Wire.Bytes(type));
             if (Vertices == null) return;
@@ -152,6 +169,33 @@ namespace Papilla
             byte* from = m + terms.RatesAt;
             fixed (float* to = Rates) Wire.Decode(from + Wire.RatesHeadBytes, Rates.Length, type, *(float*)from, to);
         }
+
+        /// <summary>Two numbers, then for each spike its unit and how long before the frame it was, us.</summary>
+        unsafe void ReadSpikes(byte* m, int bytes, Ready terms)
+        {
+            SpikeCount = 0;
+            SpikesTotal = 0;
+            if (terms.SpikesAt < 0)
+            {
+                Spikes = null;
+                return;
+            }
+            if (terms.SpikesAt + terms.SpikesBytes > bytes) throw Short(bytes);
+            int most = (terms.SpikesBytes - SpikesHeadBytes) / SpikeBytes;
+            if (Spikes == null || Spikes.Length != most) Spikes = new Spike[most];
+            byte* from = m + terms.SpikesAt;
+            uint count = *(uint*)(from + 4);
+            if (count > most) throw new FormatException("an answer names " + count + " spikes, and has room for " + most);
+            SpikesTotal = *(uint*)from;
+            SpikeCount = (int)count;
+            for (int k = 0; k < SpikeCount; k++)
+            {
+                ushort* one = (ushort*)(from + SpikesHeadBytes + SpikeBytes * k);
+                Spikes[k] = new Spike { Unit = one[0], TimeUs = (long)ClientTimeUs - one[1] };
+            }
+        }
+
+        const int SpikesHeadBytes = 8, SpikeBytes = 4;
 
         /// <summary>Memory for so many values, the same where it fits; null for none.</summary>
         static float[] Sized(float[] values, int count)

@@ -26,6 +26,12 @@ enum SummaryMember : std::size_t {
   sed_vv_px2, sed_mean_j_per_m3, sa1_rate_hz
 };
 
+/// A unit fired: its number in ready's `units`, and when, by the client's clock.
+struct Spike {
+  std::uint16_t unit = 0;
+  std::int64_t time_us = 0;
+};
+
 /// An answer was asked for what its session does not carry.
 struct NotCarried : std::logic_error {
   NotCarried(const char* member, const char* advice)
@@ -57,6 +63,7 @@ struct Answer {
   bool has_touch = false;
   Touch touch;                        ///< of poses and of gaps
   std::vector<float> pressure_pa;     ///< that was found, if asked for: a map, or a value a vertex
+  std::vector<float> shear_pa;        ///< traction along the skin, x y z a vertex in the finger's frame, if asked for
   std::vector<float> vertices;        ///< SED at the atlas' vertices, if asked for in place of a map
   bool has_summary = false;
   std::array<float, 16> summary{};    ///< see SummaryMember
@@ -64,6 +71,8 @@ struct Answer {
   std::vector<float> points;          ///< SED at the points, J/m3
   std::vector<float> point_rates_hz;  ///< firing rates there: the effect `afferents`
   std::vector<float> actuators;
+  std::vector<Spike> spikes;          ///< who fired since the answer before, in the order of time: the effect `spikes`
+  std::uint32_t spikes_total = 0;     ///< of the finger since the hello, those too that no answer carried; modulo 2^32
 
   /// Nothing of another frame is left in an answer that was not rendered; memory stays.
   void forget_values() {
@@ -71,7 +80,12 @@ struct Answer {
     window = {0, 0, 0, 0};
     touch = {};
     summary = {};
-    for (auto* const list : {&values, &pressure_pa, &vertices, &rates_hz, &points, &point_rates_hz, &actuators}) list->clear();
+    spikes.clear();
+    spikes_total = 0;
+    for (auto* const list :
+         {&values, &pressure_pa, &shear_pa, &vertices, &rates_hz, &points, &point_rates_hz, &actuators}) {
+      list->clear();
+    }
   }
   void forget_head() {
     out_of_range = no_contact = cut_off = unfamiliar = unsettled = not_tracked = coarse_clock = false;
@@ -118,18 +132,20 @@ struct Ready {
   std::uint64_t tier_number = 0;
   float pressure_max_pa = 0.0F;
   std::string atlas_hash;
-  Section touch, pressure, vertices, summary, rates, points, point_rates, actuators, map;
+  Section touch, pressure, shear, vertices, summary, rates, points, point_rates, actuators, spikes, map;
 
   /// The section of that name; null if there is no such section.
   Section* section(std::string_view name) {
     return name == "touch"         ? &touch
            : name == "pressure"    ? &pressure
+           : name == "shear"       ? &shear
            : name == "vertices"    ? &vertices
            : name == "summary"     ? &summary
            : name == "rates"       ? &rates
            : name == "points"      ? &points
            : name == "point_rates" ? &point_rates
            : name == "actuators"   ? &actuators
+           : name == "spikes"      ? &spikes
            : name == "map"         ? &map
                                    : nullptr;
   }

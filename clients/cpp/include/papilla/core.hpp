@@ -275,6 +275,8 @@ class Core {
     // Reserved here, so that no answer allocates.
     scratch_.values.reserve(map_len);
     scratch_.pressure_pa.reserve(ready.pressure.bytes / 4);
+    scratch_.shear_pa.reserve(ready.shear.bytes / 4);
+    scratch_.spikes.reserve(ready.spikes.bytes / spike_bytes);
     scratch_.vertices.reserve(ready.vertices.bytes);
     scratch_.rates_hz.reserve(ready.rates.bytes);
     scratch_.points.reserve(ready.points.bytes / 4);
@@ -284,6 +286,26 @@ class Core {
     is_ready_ = true;
     question(message);
     return Event::ready;
+  }
+
+  static constexpr std::size_t spikes_head_bytes = 8, spike_bytes = 4;
+
+  /// Two numbers, then for each spike its unit and how long before the frame it was, us.
+  static bool read_spikes(const std::uint8_t* bytes, std::size_t size, const Ready::Section& section,
+                          std::uint64_t client_time_us, Answer& answer) {
+    answer.spikes.clear();
+    answer.spikes_total = 0;
+    if (!section.there) return true;
+    if (section.bytes < spikes_head_bytes || section.offset + section.bytes > size) return false;
+    const std::uint8_t* const at = bytes + section.offset;
+    const auto count = wire::get<std::uint32_t>(at + 4);
+    if (count > (section.bytes - spikes_head_bytes) / spike_bytes) return false;
+    answer.spikes_total = wire::get<std::uint32_t>(at);
+    const auto frame_us = static_cast<std::int64_t>(client_time_us);
+    for (const std::uint8_t* one = at + spikes_head_bytes; answer.spikes.size() < count; one += spike_bytes) {
+      answer.spikes.push_back({wire::get<std::uint16_t>(one), frame_us - wire::get<std::uint16_t>(one + 2)});
+    }
+    return true;
   }
 
   bool read(const std::uint8_t* bytes, std::size_t size, const Header& header, const Ready& ready) {
@@ -297,6 +319,9 @@ class Core {
     if (answer.has_touch) answer.touch = wire::get_touch(bytes + ready.touch.offset);
     answer.pressure_pa.resize(ready.pressure.bytes / 4);
     if (!floats(ready.pressure, answer.pressure_pa.data())) return false;
+    answer.shear_pa.resize(ready.shear.bytes / 4);
+    if (!floats(ready.shear, answer.shear_pa.data())) return false;
+    if (!read_spikes(bytes, size, ready.spikes, header.client_time_us, answer)) return false;
     answer.vertices.resize(ready.vertices.bytes / sample_bytes(header.sample_type));
     if (ready.vertices.offset + ready.vertices.bytes > size) return false;
     decode_samples(header.sample_type, bytes + ready.vertices.offset, answer.vertices.size(), header.scale,

@@ -71,6 +71,12 @@ void UPapillaSessionComponent::BeginPlay()
         Problem = {"bad_address", Address.fault, "Server"};
         bIsGood = false;
     }
+    CleanToken = ToUtf8(Token);
+    if (!papilla::net::clean_token(CleanToken))
+    {
+        Problem = {"bad_token", "the token holds a blank, a line end or a character that no token has", "Token"};
+        bIsGood = false;
+    }
     if (!bIsGood)
     {
         UE_LOG(LogTemp, Error, TEXT("Papilla: %s"), *ToFString(Problem.message));
@@ -119,7 +125,7 @@ void UPapillaSessionComponent::Dial(TSharedPtr<IWebSocket>& Dialled)
 {
     HangUp(Dialled);
     FWebSocketsModule& Module = FModuleManager::LoadModuleChecked<FWebSocketsModule>(TEXT("WebSockets"));
-    Dialled = Module.CreateWebSocket(ToFString(Address.session()), FString());
+    Dialled = Module.CreateWebSocket(ToFString(Address.session()), FString(), Headers());
     // Told apart by address alone: which of the two it is changes when the session moves.
     IWebSocket* const Of = Dialled.Get();
     TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
@@ -394,12 +400,20 @@ bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const
     return true;
 }
 
+TMap<FString, FString> UPapillaSessionComponent::Headers() const
+{
+    TMap<FString, FString> Found;
+    if (!CleanToken.empty()) Found.Add(TEXT("Authorization"), TEXT("Bearer ") + ToFString(CleanToken));
+    return Found;
+}
+
 void UPapillaSessionComponent::FetchAtlas()
 {
     const auto Request = FHttpModule::Get().CreateRequest();
     // As long as a request may wait for models that are being loaded.
     Request->SetTimeout(30.0f);
     Request->SetURL(ToFString(Address.http("/v1/atlas")));
+    for (const TPair<FString, FString>& Header : Headers()) Request->SetHeader(Header.Key, Header.Value);
     TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
     Request->OnProcessRequestComplete().BindLambda([Weak](FHttpRequestPtr, FHttpResponsePtr Response, bool bGood)
     {

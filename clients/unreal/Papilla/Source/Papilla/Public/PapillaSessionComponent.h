@@ -79,6 +79,10 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
     FString Server = TEXT("127.0.0.1:7224");
 
+    /** Bearer token, if the service asks for one; blanks around it go. Do not ship it in a package that others can open. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
+    FString Token;
+
     /** Members of the protocol's hello, as JSON without braces: "tier": "small", "effects": ["summary"]. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
     FString Hello = TEXT("\"budget_us\": 11000");
@@ -177,8 +181,11 @@ private:
     void HandlePiece(const void* Data, SIZE_T Size, bool bIsLast);
     void Pump();
     void FetchAtlas();
+    /** Headers of a request: the token, if there is one. */
+    TMap<FString, FString> Headers() const;
 
     papilla::net::Address Address;
+    std::string CleanToken;
     TUniquePtr<papilla::Core> Core;
     TSharedPtr<IWebSocket> Socket, Next;
     papilla::Pieces Pieces;
