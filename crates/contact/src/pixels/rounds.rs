@@ -8,7 +8,7 @@ use crate::objects::View;
 use crate::solver::Solver;
 
 /// Rounds of vertices and pixels at most.
-const ROUNDS_MAX: usize = 12;
+const ROUNDS_MAX: usize = 24;
 /// Change of the vertices' forces, of their sum, that ends them.
 const SETTLED: f32 = 0.01;
 /// The same, above which an answer is not settled.

@@ -29,6 +29,8 @@ pub struct PixelSkin {
     pub(super) plans: Arc<Plans>,
     /// Places of the pixels at rest.
     pub(super) rest_mm: Vec<[f32; 3]>,
+    /// Mean distance of neighbours among them, along rows.
+    pub(super) apart_mm: f32,
 }
 
 impl PixelSkin {
@@ -73,6 +75,7 @@ impl PixelSkin {
             rest_mm: &rest_mm,
         };
         let corrections = own.corrections(&surface, &plans, &rows);
+        let apart_mm = apart_mm(raster.indices(), &rest_mm);
         Some(Self {
             raster,
             uv_px,
@@ -83,7 +86,16 @@ impl PixelSkin {
             mirror,
             surface,
             plans,
+            apart_mm,
             rest_mm,
         })
     }
+}
+
+/// Mean distance of pixels beside each other in a row.
+fn apart_mm(indices: &[u32], rest_mm: &[[f32; 3]]) -> f32 {
+    let beside = indices.windows(2).zip(rest_mm.windows(2)).filter(|(i, _)| i[1] == i[0] + 1);
+    let apart = |at: &[[f32; 3]]| (0..3).map(|i| (at[1][i] - at[0][i]).powi(2)).sum::<f32>().sqrt();
+    let (sum, count) = beside.fold((0.0, 0.0), |(sum, n), (_, at)| (sum + apart(at), n + 1.0f32));
+    sum / count.max(1.0)
 }

@@ -7,7 +7,14 @@ const SHARE_MAX: f32 = 0.7;
 /// Rounds from which on they take only a part of what is left of the residual: flanks of narrow things
 /// push skin aside, which gives way up to ten times as far as pixels expect.
 const LATE: usize = 4;
+/// That part at first. A round whose residual is no less than [`FALLS`] of the one before takes
+/// [`LESS`] of it, any other one [`MORE`].
 const TAKEN: f32 = 0.45;
+const FALLS: f32 = 0.9;
+const LESS: f32 = 0.7;
+const MORE: f32 = 1.1;
+/// Least such part.
+const TAKEN_MIN: f32 = 0.1;
 /// How far the first one stays behind: over long distances skin gives way as far as over short
 /// ones, so that a round overshoots by a half to all of its change.
 const FIRST: f32 = 0.4;
@@ -17,8 +24,8 @@ type Vectors = [Vec<f32>; 3];
 /// Forces that vertices and pixels hand to each other, N.
 ///
 /// A round answers forces `f` with `F(f)`. The next one starts from the secant's estimate of where
-/// `F(f) = f` (Anderson's method of depth one, J. ACM 12, 1965), late ones from less far: what settles
-/// at all has settled by then, or goes to and fro.
+/// `F(f) = f` (Anderson's method of depth one, J. ACM 12, 1965), late ones from less far, the less the
+/// more they go to and fro.
 #[derive(Debug)]
 pub(super) struct Turns {
     /// What vertices find by themselves, in this frame and in the last one.
@@ -30,6 +37,9 @@ pub(super) struct Turns {
     from: Vectors,
     before: Vectors,
     rounds: usize,
+    /// Part of the residual that late rounds take, and the last round's change over the forces.
+    taken: f32,
+    change: f32,
     warm: bool,
 }
 
@@ -37,7 +47,18 @@ impl Turns {
     pub(super) fn new(vertices: usize) -> Self {
         let zeros = || std::array::from_fn(|_| vec![0.0; vertices]);
         let [without, last, found, residual, from, before] = std::array::from_fn(|_| zeros());
-        Self { without, last, found, residual, from, before, rounds: 0, warm: false }
+        Self {
+            without,
+            last,
+            found,
+            residual,
+            from,
+            before,
+            rounds: 0,
+            taken: TAKEN,
+            change: 0.0,
+            warm: false,
+        }
     }
 
     /// To be filled with the forces that vertices find by themselves.
@@ -117,9 +138,12 @@ impl Turns {
             return 1.0;
         }
         let share = if square > 0.0 { along / square } else { 0.0 };
+        // NaN must not pass for nothing.
+        let change = if size == 0.0 { 0.0 } else { change / size };
+        let late = self.late_part(change);
         let (share, taken) = match self.rounds {
             0 => (0.0, 1.0 - FIRST),
-            rounds => (share.clamp(-SHARE_MAX, SHARE_MAX), if rounds < LATE { 1.0 } else { TAKEN }),
+            rounds => (share.clamp(-SHARE_MAX, SHARE_MAX), if rounds < LATE { 1.0 } else { late }),
         };
         let both = self.from.iter_mut().flatten().zip(self.before.iter_mut().flatten());
         let found = self.found.iter().flatten();
@@ -134,7 +158,17 @@ impl Turns {
             *force = start + taken * (end - start);
         }
         self.rounds += 1;
-        // NaN must not pass for nothing.
-        if size == 0.0 { 0.0 } else { change / size }
+        change
+    }
+
+    /// Part of the residual that a late round takes whose change is so large, over the forces.
+    fn late_part(&mut self, change: f32) -> f32 {
+        self.taken = match self.rounds {
+            0 => TAKEN,
+            _ if change > FALLS * self.change => (LESS * self.taken).max(TAKEN_MIN),
+            _ => (MORE * self.taken).min(1.0),
+        };
+        self.change = change;
+        self.taken
     }
 }

@@ -17,9 +17,16 @@ const LEVEL_MIN: f32 = 0.2;
 /// Most steps of it.
 const TURNS_MAX: u32 = 8;
 
+/// Radius of a pixel's bead over the distance of the map's pixels.
+const BEAD: f32 = 0.5;
+
 impl Window {
     /// Gaps of the pixels along the skin's normal, under the pressure whose displacement is
     /// `grid`, mm; none of those that are left when the frame's budget is used.
+    ///
+    /// A pixel is a bead under the skin that touches it from within. Its gap is that of the skin where a
+    /// thing is level with it; an edge that is sharper than a pixel is round to it, so that gaps and
+    /// normals have no jumps as it moves along the skin.
     pub(in super::super) fn measure(
         &mut self,
         skin: &PixelSkin,
@@ -28,6 +35,7 @@ impl Window {
         grid: &[f32],
         effort: &mut Effort,
     ) -> Result<(), ContactError> {
+        let bead_mm = BEAD * skin.apart_mm;
         for slot in 0..self.entries.len() {
             let inward = self.inward[slot];
             if view.is_spent(effort) {
@@ -41,14 +49,15 @@ impl Window {
             let own = grid[self.cells[slot] as usize] - dent;
             let (mut way, mut turns) = (0.0, 0);
             let (nearest, along) = loop {
-                let at: [f32; 3] =
-                    std::array::from_fn(|i| self.at_mm[slot][i] + (own + way) * inward[i]);
+                let at: [f32; 3] = std::array::from_fn(|i| {
+                    self.at_mm[slot][i] + (own + way + bead_mm) * inward[i]
+                });
                 let nearest = view.nearest_at(at.map(f64::from)).ok_or(ContactError::Diverged)?;
                 view.count(1, effort);
                 view.count_more(nearest.asked, effort);
                 let along: f32 =
                     nearest.normal.iter().zip(inward).map(|(a, b)| *a as f32 * b).sum();
-                let gap = nearest.gap_mm as f32;
+                let gap = nearest.gap_mm as f32 - bead_mm;
                 // Deep inside, the nearest side need not be the one in whose way the skin is.
                 let is_aside = gap < -DEEP_MM && (along < STEEP || gap < -FREE_MM);
                 if is_aside && turns < TURNS_MAX && !view.is_spent(effort) {
@@ -58,7 +67,8 @@ impl Window {
                 }
                 break (nearest, along);
             };
-            let gap = (nearest.gap_mm.min(1e3) as f32) / along.clamp(LEVEL_MIN, 1.0) - way;
+            let gap = nearest.gap_mm.min(1e3) as f32 - bead_mm;
+            let gap = gap / along.clamp(LEVEL_MIN, 1.0) - way;
             // In the units of the reference finger: pressure over stiffness, length over width.
             self.give[slot] =
                 (person.stiffness / (nearest.stiffness_mpa_per_mm * person.width)) as f32;
