@@ -15,7 +15,8 @@
 //!
 //! Pixels move along the skin's normal. Gaps are asked where pixels are displaced to and
 //! measured along that normal, `d / (n . m)`: a pixel meets the side that is in its way, also where
-//! another one is nearer to where it was at rest. `p >= 0`, `gap >= 0`, `p gap = 0` on
+//! another one is nearer to where it was at rest. To things a pixel is a bead of half a pixel's width
+//! under the skin, so that no edge is sharper than what moves beside it. `p >= 0`, `gap >= 0`, `p gap = 0` on
 //! pixels; the vertices' forces are the pressure's sums over their hats, and both go in turn until
 //! forces settle. A map tells means over pixels of pressure that is a cubic between those that are
 //! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part:
