@@ -73,6 +73,7 @@ SLOW = [
     "an_overloaded_service_renders_the_newest_frames",
     "nobody_waits_for_the_hard_frames_of_others",
     "a_search_for_a_net_force_has_one_budget",
+    "a_scan_becomes_a_finger_that_is_pressed",
 ]
 def fast() -> list[Step]:
     """Rust alone."""

@@ -60,6 +60,10 @@ pub(super) fn write(recipe: &Recipe<'_>, folder: &std::path::Path) -> anyhow::Re
         if let Some((_, shown)) = &progress {
             shown.set_position(done);
         }
+        // What comes between two parts is not the first one's.
+        if done >= all {
+            progress = None;
+        }
     })?;
     drop(progress);
     let path = folder.join("finger.contact");

@@ -21,6 +21,20 @@ pub(super) struct Checked {
     pub(super) tree: Tree,
 }
 
+/// The same of a mesh that need not bound a body: triangles without area are left out, nothing else
+/// is looked at.
+pub(super) fn unchecked(mesh: &Mesh) -> Result<Checked, MeshError> {
+    let (corners_mm, mut triangles) = welded(mesh)?;
+    triangles.retain(|t| square(normal(t.map(|c| corners_mm[c as usize]))) > 0.0);
+    if triangles.is_empty() {
+        return Err(MeshError::Count { found: 0 });
+    }
+    let places: Vec<_> =
+        triangles.iter().map(|t: &[u32; 3]| t.map(|c| corners_mm[c as usize])).collect();
+    let tree = Tree::new(&places);
+    Ok(Checked { corners_mm, triangles, tree })
+}
+
 /// Checks it for as long as `go_on` says so, which is asked now and then.
 pub(super) fn checked(mesh: &Mesh, go_on: &dyn Fn() -> bool) -> Result<Checked, MeshError> {
     let found = mesh.triangles.len();

@@ -76,7 +76,22 @@ impl Mesh {
     /// # Errors
     /// As [`Self::build`]; [`MeshError::Stopped`] once `go_on` said no.
     pub fn build_until(&self, go_on: &dyn Fn() -> bool) -> Result<MeshDistance, MeshError> {
-        let Checked { corners_mm, triangles, tree } = check::checked(self, go_on)?;
+        Ok(MeshDistance::new(check::checked(self, go_on)?))
+    }
+
+    /// The distance of a surface that need not be closed, of any number of triangles: its sign is
+    /// right where the nearest place is not on a rim, and which way triangles are turned is not
+    /// looked at.
+    ///
+    /// # Errors
+    /// [`MeshError::Index`], and [`MeshError::Count`] if no triangle has an area.
+    pub fn build_open(&self) -> Result<MeshDistance, MeshError> {
+        Ok(MeshDistance::new(check::unchecked(self)?))
+    }
+}
+
+impl MeshDistance {
+    fn new(Checked { corners_mm, triangles, tree }: Checked) -> Self {
         let place = |triangle: [u32; 3]| triangle.map(|c| corners_mm[c as usize]);
         let unit: Vec<[f64; 3]> =
             triangles.iter().map(|t| scaled_to_one(normal(place(*t)))).collect();
@@ -100,13 +115,11 @@ impl Mesh {
             Face { corners_mm: place(*triangle), normals: normals.map(scaled_to_one) }
         });
         let faces = faces.collect();
-        let mut built = MeshDistance { faces, tree, corners_mm, cost: 1.0 };
+        let mut built = Self { faces, tree, corners_mm, cost: 1.0 };
         built.cost = 1.0 + PER_TRIANGLE * built.triangles_asked();
-        Ok(built)
+        built
     }
-}
 
-impl MeshDistance {
     /// Mean number of triangles that are asked for a distance, at places on both sides of the
     /// surface.
     fn triangles_asked(&self) -> f64 {

@@ -202,3 +202,18 @@ fn corners_told_for_each_triangle_are_joined() {
     assert!((apart.distance([0.0, 0.0, 5.0]).gap_mm - 2.0).abs() < 1e-12);
     assert!((apart.reach_mm([0.0, 1.0, 0.0]) - 2.0).abs() < 1e-12);
 }
+
+#[test]
+fn an_open_surface_has_the_distance_of_the_closed_one_away_from_its_rim() {
+    let closed = ball(3.0, 4);
+    let mut open = closed.clone();
+    let corners = &closed.vertices_mm;
+    open.triangles.retain(|t| t.iter().all(|&c| corners[c as usize][2] < 2.0));
+    assert!(open.triangles.len() < closed.triangles.len());
+    assert!(matches!(open.build(), Err(MeshError::Open { .. })));
+    let (whole, part) = (closed.build().unwrap(), open.build_open().unwrap());
+    for p in [[0.0, 0.0, -2.0], [1.0, 0.5, -4.0], [-2.5, 0.0, -1.0], [0.0, 3.5, 0.0]] {
+        assert_eq!(whole.distance(p).gap_mm, part.distance(p).gap_mm, "{p:?}");
+    }
+    assert!(matches!(Mesh::default().build_open(), Err(MeshError::Count { found: 0 })));
+}

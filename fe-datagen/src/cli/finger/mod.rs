@@ -2,6 +2,7 @@
 
 mod build;
 mod explain;
+mod from_surface;
 mod new;
 
 use papilla_fingertip::scene::Finger;
@@ -22,6 +23,7 @@ pub(super) struct Args {
 enum Command {
     New(new::Args),
     Explain(explain::Args),
+    FromSurface(from_surface::Args),
     Build(build::Args),
 }
 
@@ -29,6 +31,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.command {
         Command::New(args) => new::run(args),
         Command::Explain(args) => explain::run(args),
+        Command::FromSurface(args) => from_surface::run(args),
         Command::Build(args) => build::run(args),
     }
 }
