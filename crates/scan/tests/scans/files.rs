@@ -147,7 +147,7 @@ fn what_is_no_surface_is_refused() {
         assert!(e.contains(name), "{e}");
     }
     assert!(refused("a.obj", b"v 0 0 0\nv 10 0 0\nv 0 20 0\n").contains("no triangles"));
-    let e = refused("a.ply", ply(&small()).replace("3 0 1 2", "3 0 1 9999").as_bytes());
+    let e = refused("a.ply", ply(&small()).replace("3 0 2 1", "3 0 2 9999").as_bytes());
     assert!(e.contains("names a corner that is not there"), "{e}");
     // A GLB that is cut off anywhere is refused, or is still whole.
     let whole = glb(&small());

@@ -73,7 +73,7 @@ fn the_nail_is_found_where_nobody_said_where_it_is() {
 fn a_small_and_a_wide_finger_are_found() {
     let usual = FingertipShape::default();
     let child = FingertipShape {
-        length_mm: 17.5,
+        length_mm: 17.0,
         width_mm: 12.0,
         height_mm: 9.5,
         cap_length_mm: 8.0,
