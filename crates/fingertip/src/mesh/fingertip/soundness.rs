@@ -7,8 +7,8 @@ use crate::mesh::half_cube::MEDIUM;
 use crate::mesh::quality;
 use crate::tissue::Tissue;
 
-/// Least scaled Jacobian of soft tissue that is meshed: that of the default finger is
-/// [a little more than .1](tests), and Newton's method needs but a positive one.
+/// Least scaled Jacobian of soft tissue that is accepted. That of the default finger is .18; Newton's
+/// method needs but a positive one.
 pub const SCALED_JACOBIAN_MIN: f64 = 0.03;
 
 /// The least scaled Jacobian of the soft tissue, on the even mesh of medium density and on the base
