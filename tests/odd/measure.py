@@ -19,7 +19,7 @@ from papilla_trainer.dataset import Dataset
 SIDE_PX = 224
 DATA = Path("data")
 # Fitted to; only looked at.
-TRAINED, OTHERS = ("more-graded", "broad-graded", "pressed-graded", "hard-graded", "proximal-graded"), ("heldout-graded", "final", "heldout")
+TRAINED, OTHERS = ("more-graded", "broad-graded", "pressed-graded", "hard-graded", "proximal-graded"), ("heldout-graded", "final")
 # Room beyond the greatest of the training, as proto/src/input_statistics.rs has it.
 HEADROOM = np.array([1.05, 1.05, 2.0, 1.5, 1.5])
 WORDS = ("rougher", "heavier", "rougher for its load", "wider", "richer in contrast")
@@ -51,7 +51,7 @@ def numbers(pressure_pa: Map) -> tuple[float, float, float, float, float]:
 def odd_maps() -> Iterator[tuple[str, Map]]:
     """Maps within the range of pressure that no press makes."""
     skin = np.zeros(SIDE_PX * SIDE_PX, np.float32)
-    skin[np.load(DATA / "s1" / "raster.npz")["skin_pixel"]] = ODD_PA
+    skin[np.load(DATA / "broad-graded" / "raster.npz")["skin_pixel"]] = ODD_PA
     skin = skin.reshape(SIDE_PX, SIDE_PX)
     rows, columns = np.mgrid[:SIDE_PX, :SIDE_PX]
     for square_px in (1, 2, 4, 8, 16, 32):

@@ -3,8 +3,7 @@
 // An engine knows how deep each vertex of the undeformed finger lies in an object, not what the skin makes of it. The foundation
 // gives every vertex a spring of its own: p = k max(0, d - relief d_max)^n, where d is the penetration of the vertex and
 // d_max that of the deepest one. `relief` is the skin that sinks beside the contact without touching. With n = 1 and no relief it
-// is Winkler's foundation. Constants were fitted to the FE indentations, which are 20 to 45 % off it (relative L2 of
-// the pressure at the vertices; Winkler's 31 to 57 %): docs/reference/clients/web.md has the table, `npm run foundation` measures it.
+// is Winkler's foundation. How far it is off finite elements: docs/reference/clients/web.md.
 
 /**
  * @typedef {object} Law

@@ -4,13 +4,12 @@
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { test } from 'node:test';
-import { measure } from '../foundation/measure.js';
+import { Foundation } from '../src/foundation.js';
 import { crop, greatest } from '../src/window.js';
 import { MAP_LEN, toHalf } from '../src/wire.js';
 import { launch, openPage } from './browser.js';
 
 const page = await readFile(new URL('../../../docs/reference/clients/web.md', import.meta.url), 'utf8');
-const penetration = await readFile(new URL('../../../studies/reports/penetration.md', import.meta.url), 'utf8');
 
 test('f16 rounds to the nearest, ties to even, and clamps', () => {
   for (const [value, bits] of [[0, 0], [1, 0x3c00], [65504, 0x7bff], [1e9, 0x7bff], [-1, 0xbc00], [2 ** -24, 1], [2 ** -25, 0],
@@ -32,16 +31,22 @@ test('what is no pressure is refused before it is rounded, and cropping leaves n
   assert.equal(greatest(Float32Array.of(0, -0, 3, 7, 2, 9), 0, 3, 2, 2), 7);
 });
 
-test('the foundation is off the FE indentations by what its report says, with the constants that fit', () => {
-  const [fitted, winkler] = measure();
-  for (const { law, stiffness } of [fitted, winkler]) assert.ok(Math.abs(stiffness / law.stiffness - 1) < 1e-3, `${stiffness}`);
-  const percent = (/** @type {number} */ value) => `${(100 * value).toFixed(1)} %`;
-  for (const set of ['s1', 'broad', 'heldout', 'deep']) {
-    const [ours, other] = [fitted, winkler].map(({ rows }) => /** @type {typeof fitted.rows[0]} */ (rows.find(({ of }) => of === set)));
-    const line = penetration.split('\n').find((one) => one.startsWith(`| \`${set}\``));
-    const due = [String(ours.states), ...[ours.l2_median, ours.l2_p95, ours.sum_median, other.l2_median, other.sum_median].map(percent)];
-    assert.deepEqual(line?.split('|').slice(2, -1).map((cell) => cell.trim()), due, set);
-  }
+test('the foundation presses as its law says, and on soft objects as hard as they press back', () => {
+  const penetration = Float32Array.of(-1, 0, 0.5, 1, 2);
+  const pressures = new Float32Array(5);
+  const near = (/** @type {number} */ found, /** @type {number} */ due) => assert.ok(Math.abs(found - due) <= 1e-6 * Math.abs(due), `${found}, not ${due}`);
+  const foundation = new Foundation({ stiffness: 1000, exponent: 0.5, relief: 0.25 });
+  foundation.pressures(penetration, pressures);
+  [0, 0, 0, 1000 * Math.sqrt(0.5), 1000 * Math.sqrt(1.5)].forEach((due, i) => near(pressures[i], due));
+  near(foundation.peakPa, 1000 * Math.sqrt(1.5));
+  assert.equal(foundation.fingerShare, 1);
+  // Springs in series: the finger of 1000 Pa/mm takes three quarters beside an object of 3000 Pa/mm.
+  const springs = new Foundation({ stiffness: 1000, exponent: 1, relief: 0 });
+  springs.pressures(penetration, pressures, 3000);
+  near(springs.fingerShare, 0.75);
+  near(pressures[4], 1500);
+  springs.pressures(penetration, pressures, Infinity, 1200);
+  near(pressures[4], 1200);
 });
 
 test('the first code of the page makes a SED map', async () => {

@@ -14,7 +14,7 @@ use std::process::ExitCode;
 /// Held-out indentations are not read. Layers and finite strain on, rigid bone and nail.
 #[derive(clap::Args)]
 #[command(after_help = "Takes 3 min and 3 GB.\n\
-                        Example: fe-datagen contact data/s1 data/broad --out out/contact")]
+                        Example: fe-datagen contact data/s1-graded data/broad-graded --out out/contact")]
 pub(super) struct Args {
     /// Datasets of this finger, by density medium.
     #[arg(required = true)]

@@ -38,8 +38,8 @@ use std::time::Duration;
 #[command(
     after_help = "USR1 and TERM: store where each indentation stands at its next depth, and leave with exit code\n\
                   75, which asks to be started again; it goes on from there. A second TERM leaves at once.\n\
-                  Examples: fe-datagen generate campaigns/s1.toml --out out/s1\n          \
-                  fe-datagen generate campaigns/s1.toml --slice 3/100 --out /shared/s1\n          \
+                  Examples: fe-datagen generate campaigns/broad-graded.toml --out out/broad\n          \
+                  fe-datagen generate campaigns/broad-graded.toml --slice 3/100 --out /shared/broad\n          \
                   fe-datagen generate campaigns/final.toml --mesh medium-graded --out data/rungs/medium-graded"
 )]
 pub(super) struct Args {

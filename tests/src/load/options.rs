@@ -22,11 +22,11 @@ Examples:
   papilla-load --sessions 8 --rate-hz 30 --tier small
   papilla-load --budget-us 0 --deadline-us 11111
                                                 drop nothing, count what a 90 Hz frame misses
-  papilla-load --dataset data/s1 --sample-type u16 --verify
+  papilla-load --dataset data/broad-graded --sample-type u16 --verify
   papilla-load --arrivals poisson --sessions 16 --rate-hz 60
                                                 frames that do not keep a beat
   papilla-load --against 127.0.0.1:7225         two services in turn, and how they compare
-  papilla-load --speak oip --tier nano --sessions 8 --against 127.0.0.1:8000 --dataset data/heldout
+  papilla-load --speak oip --tier nano --sessions 8 --against 127.0.0.1:8000 --dataset data/heldout-graded
                                                 beside any other Open Inference server
   papilla-load --contact touch --rate-hz 1000 --fingers 2
                                                 poses in, forces out, beside an echo of the bytes

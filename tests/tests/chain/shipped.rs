@@ -6,12 +6,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use papilla_dataset::{Dataset, Field, IndentationEntry, Maps, Shard, Split};
+use papilla_dataset::{Dataset, Field, IndentationEntry, Maps, Shard, ShardMaps, Split};
 use papilla_engine::Card;
-use papilla_fingertip::scene::Scene;
+use papilla_fingertip::{campaign::CampaignSpec, scene::Scene};
 use papilla_proto::{
     MAP_LEN,
-    atlas::{Atlas, Patch, Raster},
+    atlas::{Atlas, Patch, VertexSampler},
 };
 
 use crate::{
@@ -26,7 +26,7 @@ pub(crate) fn folder(name: &str) -> PathBuf {
     let there = fs::read_dir(&path).is_ok_and(|mut entries| entries.next().is_some());
     assert!(
         there,
-        "{name}/ is missing or empty in the repository: models/ and data/s1/ ship with it; \
+        "{name}/ is missing or empty in the repository: models/ and data/ ship with it; \
          docs/reference/dataset.md and docs/guides/training.md say how they are made"
     );
     path
@@ -38,17 +38,17 @@ pub(crate) fn text(path: &Path) -> String {
         .unwrap_or_else(|error| panic!("{}: {error}; it ships with the repository", path.display()))
 }
 
+/// The plates of the published campaign.
 fn dataset() -> Dataset {
-    Dataset::open(&folder("data/s1")).unwrap()
+    Dataset::open(&folder("data/s1-graded")).unwrap()
 }
 
-/// The shipped dataset that a card was measured on, and its folder.
-fn judged_on(card: &Card) -> (PathBuf, Dataset) {
+/// The shipped dataset that a card was measured on.
+fn judged_on(card: &Card) -> Dataset {
     let due = card.metrics.dataset_sha256.as_ref().unwrap_or(&card.dataset_sha256);
-    let shipped = ["data/s1", "data/broad", "data/broad-graded"].map(folder);
-    let opened = shipped.map(|path| (path.clone(), Dataset::open(&path).unwrap()));
-    let found = opened.into_iter().find(|(_, d)| d.manifest().dataset_sha256 == *due);
-    found.unwrap_or_else(|| panic!("{}: its dataset {due} does not ship", card.name))
+    let dataset = Dataset::open(&folder("data/broad-graded")).unwrap();
+    assert_eq!(dataset.manifest().dataset_sha256, *due, "{}: its dataset does not ship", card.name);
+    dataset
 }
 
 fn held_out(dataset: &Dataset) -> Vec<&IndentationEntry> {
@@ -56,16 +56,50 @@ fn held_out(dataset: &Dataset) -> Vec<&IndentationEntry> {
     indentations.filter(|indentation| indentation.split == Split::Test).collect()
 }
 
-fn samples(shard: &Shard) -> Vec<Sample> {
-    let sample = |i: usize| Sample {
-        pressure_pa: shard.pressure_pa.row(i).to_vec(),
-        sed_j_per_m3: shard.sed_dermis_j_per_m3.row(i).to_vec(),
-        depth_mm: shard.depth_mm[i],
-    };
-    (0..shard.len()).map(sample).collect()
+fn map(states: &ShardMaps<'_>, field: Field, state: usize) -> Vec<f32> {
+    let mut map = vec![0.0; MAP_LEN];
+    states.draw(field, state, &mut map).unwrap();
+    map
 }
 
-/// The contact model is of the networks' finger, and its load modes are of the shipped datasets.
+/// Maps of a dataset's states.
+struct Drawn {
+    dataset: Dataset,
+    maps: Maps,
+}
+
+impl Drawn {
+    fn of(dataset: Dataset) -> Self {
+        let maps = Maps::read(dataset.folder(), dataset.atlas()).unwrap();
+        Self { dataset, maps }
+    }
+
+    /// The states of a simulation as their maps have them at the atlas' vertices.
+    fn samples(&self, shard: &Shard) -> Vec<Sample> {
+        let states = self.maps.of(shard);
+        let at_vertices = |field, patch, state| {
+            let sampler = VertexSampler::new(self.dataset.atlas(), self.maps.raster(patch));
+            let mut values = vec![0.0; sampler.vertex_count()];
+            sampler.sample(&map(&states, field, state), &mut values).unwrap();
+            values.iter().map(|v: &f32| v.max(0.0)).collect()
+        };
+        let sample = |state| Sample {
+            pressure_pa: at_vertices(Field::Pressure, Patch::Skin, state),
+            sed_j_per_m3: at_vertices(Field::SedDermis, Patch::Interface, state),
+            depth_mm: shard.depth_mm[state],
+        };
+        (0..shard.len()).map(sample).collect()
+    }
+}
+
+/// What the load modes of the contact model are of: two datasets that graded ones have replaced
+/// (docs/concepts/contact.md, 'The model's file').
+const OF_MODES: [&str; 2] = [
+    "47e9d3921cb8fb18d3bc8450e99283e2aaa6027559177f7f616d3c5e2ba90e54",
+    "5e79a134e820429279ae9ce85a663acdefc6cbdfb2f9f9251e6fc83dd01e4dae",
+];
+
+/// The contact model is of the networks' finger, and says of which datasets its load modes are.
 #[test]
 fn the_shipped_contact_model_says_where_it_is_from() {
     let bytes = fs::read(folder("models").join("finger.contact")).unwrap();
@@ -73,9 +107,8 @@ fn the_shipped_contact_model_says_where_it_is_from() {
     let atlas = Atlas::from_json(&text(&folder("models").join("atlas.json"))).unwrap();
     model.require_atlas(atlas.hash()).unwrap();
     assert_eq!(model.vertices(), atlas.vertex_count());
-    let hash = |name| Dataset::open(&folder(name)).unwrap().manifest().dataset_sha256.clone();
     let header = model.header();
-    assert_eq!(header.datasets, ["data/s1", "data/broad"].map(hash));
+    assert_eq!(header.datasets, OF_MODES);
     assert_eq!(header.effects, ["finite_strain", "layers"]);
     assert!(header.modes > 0 && header.depth_max_mm > 1.0, "{header:?}");
     // Epidermis, dermis, subcutaneous tissue.
@@ -88,9 +121,10 @@ async fn the_shipped_models_answer_every_client() {
     let dataset = dataset();
     assert_eq!(service.atlas.hash(), dataset.atlas().hash());
     for card in &service.cards {
-        assert_eq!(judged_on(card).1.atlas().hash(), dataset.atlas().hash(), "{}", card.name);
+        assert_eq!(judged_on(card).atlas().hash(), dataset.atlas().hash(), "{}", card.name);
     }
-    let states = samples(&dataset.shard(held_out(&dataset)[0]).unwrap());
+    let drawn = Drawn::of(dataset);
+    let states = drawn.samples(&drawn.dataset.shard(held_out(&drawn.dataset)[0]).unwrap());
     let deepest = states.last().unwrap();
     client::http_answers_are_the_librarys(&service, deepest).await;
     client::nothing_in_nothing_out(&service).await;
@@ -103,19 +137,13 @@ async fn the_shipped_models_answer_every_client() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_card_tells_the_truth() {
     let service = Service::shipped().await;
-    let (path, dataset) = judged_on(&service.cards[0]);
-    let maps = Maps::read(&path, dataset.atlas()).unwrap();
+    let drawn = Drawn::of(judged_on(&service.cards[0]));
     let mut all = Vec::new();
-    for indentation in held_out(&dataset) {
-        let shard = dataset.shard(indentation).unwrap();
-        let states = maps.of(&shard);
+    for indentation in held_out(&drawn.dataset) {
+        let shard = drawn.dataset.shard(indentation).unwrap();
+        let states = drawn.maps.of(&shard);
         for state in 0..shard.len() {
-            let drawn = |field| {
-                let mut map = vec![0.0; MAP_LEN];
-                states.draw(field, state, &mut map).unwrap();
-                map
-            };
-            all.push([drawn(Field::Pressure), drawn(Field::SedDermis)]);
+            all.push([Field::Pressure, Field::SedDermis].map(|field| map(&states, field, state)));
         }
     }
     let card = &service.cards[0].metrics;
@@ -128,16 +156,16 @@ async fn the_card_tells_the_truth() {
 /// The map knows the undeformed area, the force the deformed one: they agree to some percent.
 #[test]
 fn maps_of_the_dataset_carry_the_force_of_the_plate() {
-    let dataset = dataset();
-    let skin = Raster::new(dataset.atlas(), Patch::Skin);
-    let mut map = vec![0.0; MAP_LEN];
-    for indentation in held_out(&dataset) {
+    let drawn = Drawn::of(dataset());
+    let (dataset, skin) = (&drawn.dataset, drawn.maps.raster(Patch::Skin));
+    for indentation in held_out(dataset) {
         let shard = dataset.shard(indentation).unwrap();
-        for (sample, force_n) in samples(&shard).iter().zip(shard.force_n.rows()) {
-            skin.rasterise(&sample.pressure_pa, &mut map).unwrap();
+        let states = drawn.maps.of(&shard);
+        for (state, force_n) in shard.force_n.rows().into_iter().enumerate() {
+            let map = map(&states, Field::Pressure, state);
             let force_n = force_n.iter().map(|f| f64::from(f * f)).sum::<f64>().sqrt();
-            let share = map_integral(dataset.atlas(), &skin, &map) / force_n;
-            let what = format!("press {}, {} mm", indentation.id, sample.depth_mm);
+            let share = map_integral(dataset.atlas(), skin, &map) / force_n;
+            let what = format!("press {}, {} mm", indentation.id, shard.depth_mm[state]);
             assert!((share - 1.0).abs() < 0.1, "{what}: {share} of the force");
         }
     }
@@ -146,13 +174,16 @@ fn maps_of_the_dataset_carry_the_force_of_the_plate() {
 /// The solver of today finds what the dataset holds, on the atlas that the models carry.
 #[test]
 fn a_shipped_press_can_be_solved_again() {
-    let dataset = dataset();
-    let indentation = held_out(&dataset)[0];
+    let dataset = Dataset::open(&folder("data/rungs/medium-linear")).unwrap();
+    let spec = CampaignSpec::read(&folder("campaigns").join("final.toml")).unwrap();
+    let indentation = held_out(&dataset).into_iter().find(|i| i.indenter == "table top").unwrap();
     let shard = dataset.shard(indentation).unwrap();
-    // The campaign's plate is this scene's; mesh and pose are the indentation's.
     let mut scene = Scene::read(&folder("scenes").join("flat-press.toml")).unwrap();
     scene.geometry =
         toml::from_str("kind = \"fingertip\"\ndensity = \"medium\"\norder = \"linear\"").unwrap();
+    let candidates = spec.candidates();
+    scene.indenter =
+        candidates.into_iter().find(|c| c.name == indentation.indenter).unwrap().indenter;
     scene.motion.pitch_deg = indentation.pose.pitch_deg;
     scene.motion.roll_deg = indentation.pose.roll_deg;
     scene.motion.yaw_deg = indentation.pose.yaw_deg;
@@ -163,7 +194,8 @@ fn a_shipped_press_can_be_solved_again() {
     let shipped = Atlas::from_json(&text(&folder("models").join("atlas.json")));
     assert_eq!(pressed.atlas.hash(), shipped.unwrap().hash(), "the atlas of the models");
     let found = &pressed.samples()[0];
-    let due = &samples(&shard)[0];
-    assert_close("pressure", &found.pressure_pa, &due.pressure_pa, 1e-3);
-    assert_close("SED", &found.sed_j_per_m3, &due.sed_j_per_m3, 1e-3);
+    let [pressure_pa, sed_j_per_m3] = [&shard.pressure_pa, &shard.sed_dermis_j_per_m3]
+        .map(|at_vertices| at_vertices.row(0).to_vec());
+    assert_close("pressure", &found.pressure_pa, &pressure_pa, 1e-3);
+    assert_close("SED", &found.sed_j_per_m3, &sed_j_per_m3, 1e-3);
 }

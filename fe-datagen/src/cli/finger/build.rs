@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// Folder of the finger.
     finger: PathBuf,
     /// Datasets that give the load modes.
-    #[arg(long, num_args = 1.., default_values = ["data/s1", "data/broad"], value_name = "DATASET")]
+    #[arg(long, num_args = 1.., default_values = ["data/s1-graded", "data/broad-graded"], value_name = "DATASET")]
     presses: Vec<PathBuf>,
     /// Load modes of the second order.
     #[arg(long, default_value_t = MODES)]
