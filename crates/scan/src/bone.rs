@@ -1,8 +1,8 @@
 //! The template's bone fitted to a surface of the bone.
 
 use crate::ScanError;
-use crate::fit::Placed;
 use crate::least_squares::{Parameter, minimise};
+use crate::placed::Placed;
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::geometry::fingertip::offset::at_uv;
 use papilla_fingertip::scene::finger::FIELDS;

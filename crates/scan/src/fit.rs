@@ -2,6 +2,7 @@
 
 use crate::clean::{Cleaned, clean};
 use crate::least_squares::{Parameter, minimise};
+use crate::placed::{Placed, distance_of};
 use crate::skin::{Skin, offset};
 use crate::{ScanError, Surface};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
@@ -10,7 +11,7 @@ use papilla_fingertip::mesh::fingertip::check_elements;
 use papilla_fingertip::scene::finger::{FIELDS, SKIN_FILE, Source};
 use papilla_fingertip::scene::{Finger, FingerError};
 use papilla_sdf::vector::{cross, dot, minus, norm};
-use papilla_sdf::{Mesh, MeshDistance, Placement};
+use papilla_sdf::{MeshDistance, Placement};
 
 /// Rows and columns of the places where the template is compared with the surface.
 const PLACES: [u32; 2] = [24, 32];
@@ -50,42 +51,6 @@ pub struct Inside<'a> {
     pub numbers: Option<&'a Finger>,
     /// The bone's surface, in the same frame.
     pub bone: Option<&'a Surface>,
-}
-
-/// A surface in the finger's frame.
-pub struct Placed {
-    corners_mm: Vec<[f64; 3]>,
-    distance: MeshDistance,
-    placement: Placement,
-}
-
-impl Placed {
-    fn new(surface: &Surface, placement: Placement) -> Result<Self, ScanError> {
-        let used: std::collections::BTreeSet<u32> =
-            surface.triangles.iter().flatten().copied().collect();
-        let corners_mm = used.iter().map(|&c| surface.vertices_mm[c as usize]).collect();
-        Ok(Self { corners_mm, distance: distance_of(surface)?, placement })
-    }
-
-    /// Its corners in the finger's frame, mm.
-    pub(crate) fn corners_mm(&self) -> Vec<[f64; 3]> {
-        let Placement { rotation, origin_mm } = self.placement;
-        let moved = |p: &[f64; 3]| std::array::from_fn(|i| dot(rotation[i], *p) + origin_mm[i]);
-        self.corners_mm.iter().map(moved).collect()
-    }
-
-    /// Signed distance of a point of the finger's frame, mm.
-    #[must_use]
-    pub fn gap_mm(&self, p: [f64; 3]) -> f64 {
-        self.placement.distance(&self.distance, p).gap_mm
-    }
-
-    /// Signed distance and its gradient.
-    #[must_use]
-    pub fn gap_and_normal(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
-        let found = self.placement.distance(&self.distance, p);
-        (found.gap_mm, found.normal)
-    }
 }
 
 /// A fitted finger and how well it fits.
@@ -169,12 +134,6 @@ fn say(skin: &Skin, done: &mut Vec<String>) {
 }
 
 /// The distance of a surface that need not be closed.
-fn distance_of(surface: &Surface) -> Result<MeshDistance, ScanError> {
-    let mesh =
-        Mesh { vertices_mm: surface.vertices_mm.clone(), triangles: surface.triangles.clone() };
-    Ok(mesh.build_open()?)
-}
-
 fn direction(axis: [f64; 3]) -> Result<[f64; 3], ScanError> {
     let size = norm(axis);
     if size > 0.0 && size.is_finite() {

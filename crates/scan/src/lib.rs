@@ -10,6 +10,7 @@ mod error;
 pub mod fit;
 mod least_squares;
 pub mod picture;
+pub mod placed;
 pub mod read;
 pub mod skin;
 

@@ -1,7 +1,7 @@
 //! The skin's offset from the fitted template: a smooth field through the distances to the surface.
 
-use crate::fit::Placed;
 use crate::least_squares::solve;
+use crate::placed::Placed;
 use papilla_fingertip::geometry::fingertip::offset::{
     COLUMNS, OFFSET_MAX_MM, ROWS, at_uv, weights,
 };

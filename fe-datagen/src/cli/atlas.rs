@@ -37,7 +37,7 @@ fn density(name: &str) -> Result<Density, String> {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let finger = super::finger::named(args.finger.as_deref())?;
+    let finger = super::chosen_finger::named(args.finger.as_deref())?;
     let body = Body::even(&finger.shape, &finger.tissue, args.density)?;
     let (atlas, report) = body.atlas().context("a fingertip has an atlas patch")??;
     if let Some(folder) = &args.out {

@@ -34,7 +34,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let finger = super::finger::named(args.finger.as_deref())?;
+    let finger = super::chosen_finger::named(args.finger.as_deref())?;
     let recipe = Recipe {
         finger: &finger,
         datasets: &args.datasets,

@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     // Before minutes of work: can it be written?
     papilla_output::atomic::create_folder(&args.out)?;
     let begun_s = processor::thread_s();
-    let finger = super::finger::named(args.finger.as_deref())?;
+    let finger = super::chosen_finger::named(args.finger.as_deref())?;
     let (order, materials) = (Order::Linear, finger.tissue);
     let density = args.density.into();
     let body = influence::body(&finger.shape, density, order, &materials)?;

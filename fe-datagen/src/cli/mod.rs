@@ -3,6 +3,7 @@
 mod atlas;
 mod campaign_file;
 pub mod choices;
+mod chosen_finger;
 mod contact;
 mod convergence;
 mod dataset;

@@ -5,6 +5,7 @@
 
 pub(crate) mod biphasic;
 mod census;
+pub(crate) mod cure;
 pub mod effects;
 pub(crate) mod error;
 pub mod finger;

@@ -1,8 +1,9 @@
 //! `finger explain`: what a finger's file says, and whether it can be meshed.
 
 use crate::cli::print;
+use papilla_fingertip::geometry::fingertip::SCALED_JACOBIAN_MIN;
 use papilla_fingertip::geometry::fingertip::SurfaceParameter;
-use papilla_fingertip::mesh::fingertip::{SCALED_JACOBIAN_MIN, check_elements};
+use papilla_fingertip::mesh::fingertip::check_elements;
 use papilla_fingertip::scene::Finger;
 use papilla_fingertip::scene::finger::{FIELDS, Source};
 use papilla_fingertip::tissue::Tissue;

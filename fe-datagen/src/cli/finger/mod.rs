@@ -5,8 +5,6 @@ mod explain;
 mod from_surface;
 mod new;
 
-use papilla_fingertip::scene::Finger;
-use std::path::Path;
 use std::process::ExitCode;
 
 /// Make a finger of your own, see what it is, and what the service needs of it.
@@ -33,16 +31,5 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Command::Explain(args) => explain::run(args),
         Command::FromSurface(args) => from_surface::run(args),
         Command::Build(args) => build::run(args),
-    }
-}
-
-/// The finger that an option names; the default one if it names none.
-///
-/// # Errors
-/// It is not there, or makes no sense.
-pub(super) fn named(name: Option<&Path>) -> anyhow::Result<Finger> {
-    match name {
-        Some(name) => Ok(Finger::find(name, Path::new(""))?),
-        None => Ok(Finger::usual()),
     }
 }

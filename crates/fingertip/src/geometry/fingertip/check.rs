@@ -3,6 +3,9 @@
 use super::offset::{at_uv, uv};
 use super::{FingertipShape, SKIN_SHARE_MAX, SurfaceParameter};
 
+/// Least scaled Jacobian of soft tissue that is accepted; Newton's method needs but a positive one.
+pub const SCALED_JACOBIAN_MIN: f64 = 0.03;
+
 /// Why a shape was refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum FingertipShapeError {
@@ -81,7 +84,7 @@ pub enum FingertipShapeError {
         "the {tissue} folds at the {region} (u = {u:.2}, v = {v:.2}; x = {:.1}, y = {:.1}, z = {:.1} mm): scaled \
          Jacobian {scaled_jacobian:.3}, {} is the least. Smooth the skin there, or make the layers thinner, the \
          bone slimmer",
-        at_mm[0], at_mm[1], at_mm[2], crate::mesh::fingertip::SCALED_JACOBIAN_MIN
+        at_mm[0], at_mm[1], at_mm[2], SCALED_JACOBIAN_MIN
     )]
     Distorted {
         /// Which layer.

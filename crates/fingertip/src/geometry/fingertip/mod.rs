@@ -15,7 +15,7 @@
 mod check;
 pub mod offset;
 
-pub use check::FingertipShapeError;
+pub use check::{FingertipShapeError, SCALED_JACOBIAN_MIN};
 pub use offset::{SkinOffset, SkinOffsetError};
 
 use check::GAP_MIN_MM;

@@ -25,7 +25,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use blame::blame;
-pub use soundness::{SCALED_JACOBIAN_MIN, check_elements};
+pub use soundness::check_elements;
 
 pub use super::leaves::Leaf;
 pub use super::patch::{Patch, Vertices};

@@ -1,15 +1,11 @@
 //! Whether the elements of a finger's mesh are well shaped, and where not.
 
 use super::{Density, FingertipShapeError, Order, Parts, build};
-use crate::geometry::fingertip::FingertipShape;
 use crate::geometry::fingertip::offset::uv;
+use crate::geometry::fingertip::{FingertipShape, SCALED_JACOBIAN_MIN};
 use crate::mesh::half_cube::MEDIUM;
 use crate::mesh::quality;
 use crate::tissue::Tissue;
-
-/// Least scaled Jacobian of soft tissue that is accepted. That of the default finger is .18; Newton's
-/// method needs but a positive one.
-pub const SCALED_JACOBIAN_MIN: f64 = 0.03;
 
 /// The least scaled Jacobian of the soft tissue, on the even mesh of medium density and on the base
 /// of the graded one.

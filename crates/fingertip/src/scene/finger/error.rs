@@ -1,6 +1,6 @@
 //! Why a finger's file was refused.
 
-use super::super::error::{cure, material_field};
+use super::super::cure::{cure, material_field};
 use super::super::materials::TissueError;
 use super::super::origin::{Located, Origin};
 use super::fields::FIELDS;

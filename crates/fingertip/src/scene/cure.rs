@@ -1,0 +1,42 @@
+//! What errors of scenes and of fingers' files say alike: the cure, and the field to blame.
+
+use super::materials::TissueError;
+use crate::materials::MaterialError;
+
+/// What to do about a parser's message, where it does not say so itself.
+pub(super) fn cure(message: &str) -> String {
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    if let (Some(missing), true) = (quoted.first(), message.starts_with("missing field")) {
+        return format!(": add it (docs/reference/scenes.md has `{missing}` with its unit)");
+    }
+    if message.starts_with("unknown field") {
+        let meant =
+            |known: &&&str| known.strip_prefix(quoted[0]).is_some_and(|r| r.starts_with('_'));
+        return quoted.iter().skip(1).find(meant).map_or_else(String::new, |meant| {
+            format!("; did you mean `{meant}`? Units stand in the names of fields")
+        });
+    }
+    if message.starts_with("invalid type: string") && message.ends_with("expected f64") {
+        return ": write a bare number, its unit stands in the name of the field".into();
+    }
+    String::new()
+}
+
+/// The field that a material's error is about.
+pub(crate) fn material_field(error: &TissueError) -> String {
+    let field = match error.source {
+        MaterialError::YoungsModulus(_) | MaterialError::Units { .. } => ".youngs_modulus_mpa",
+        MaterialError::PoissonsRatio(_) => ".poissons_ratio",
+        MaterialError::OgdenTerms { .. }
+        | MaterialError::OgdenUnstable(_)
+        | MaterialError::OgdenUnits(_) => ".ogden.mu_mpa",
+        MaterialError::OgdenExponent(_) => ".ogden.alpha",
+        MaterialError::Calibrated(..) => ".ogden.calibrated_stretch",
+        MaterialError::PronyTerms { .. } | MaterialError::PronyShare(_) => ".prony.share",
+        MaterialError::PronyTime(_) => ".prony.time_s",
+        MaterialError::Biphasic(e) => {
+            return format!("materials.{}.biphasic.{}", error.tissue, e.field());
+        }
+    };
+    format!("materials.{}{field}", error.tissue)
+}
