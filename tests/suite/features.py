@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAMS = ["papilla-server", "papilla-fe-datagen", "papilla-model-export", "papilla-studies"]
+PROGRAMS = ["papilla-server", "papilla-fe-datagen", "papilla-model-export", "papilla-studies", "papilla-python"]
 Units = dict[tuple[str, str], set[str]]
 
 

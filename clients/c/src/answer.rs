@@ -54,15 +54,9 @@ impl Answer<'_> {
 
 /// Where the sections of an answer lie among its numbers.
 #[derive(Debug, Clone)]
-pub(crate) struct Layout(Vec<Section>);
+pub(crate) struct Layout(pub(crate) Vec<Section>);
 
 impl Layout {
-    /// Those of a finger, and behind their `behind` bytes those of effects.
-    pub(crate) fn of(finger: &[Section], behind: usize, effects: &[Section]) -> Self {
-        let moved = effects.iter().map(|s| Section { offset: s.offset + behind as u32, ..*s });
-        Self(finger.iter().copied().chain(moved).collect())
-    }
-
     /// Most numbers of an answer.
     pub(crate) fn len(&self) -> usize {
         let end = |s: &Section| (s.offset + s.bytes) as usize - HEADER_LEN;

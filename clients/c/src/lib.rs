@@ -22,7 +22,6 @@
 mod answer;
 mod border;
 mod hello;
-mod model;
 mod session;
 mod status;
 
@@ -35,7 +34,6 @@ mod status;
 static HEAP: rlsf::GlobalTlsf = rlsf::GlobalTlsf::new();
 
 pub use answer::Answer;
-pub use model::{LoadError, Model};
-pub use papilla_proto::Problem;
+pub use papilla_inside::{LoadError, Model, Problem};
 pub use session::Session;
 pub use status::Status;

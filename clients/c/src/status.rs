@@ -1,5 +1,6 @@
 //! What a call returns: one number a reason, the same in every version.
 
+use papilla_inside::LoadError;
 use papilla_proto::ErrorCode;
 
 /// A status of the C interface. Numbers do not change; new ones are added at the end.
@@ -94,6 +95,16 @@ impl From<ErrorCode> for Status {
             ErrorCode::OutOfRange => Self::OutOfRange,
             // Of the wire alone: nothing here makes them.
             _ => Self::Internal,
+        }
+    }
+}
+
+impl From<&LoadError> for Status {
+    fn from(error: &LoadError) -> Self {
+        match error {
+            LoadError::File { .. } => Self::NoFile,
+            LoadError::Unknown { .. } => Self::UnknownTier,
+            _ => Self::BadModel,
         }
     }
 }

@@ -6,6 +6,8 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 - `sed(pressure_pa)`: one map over HTTP
 - `Session`, `AsyncSession`: many maps, or where things are, over a WebSocket; the latest frame wins
 - `render`: a series of frames in one call, as arrays with units and files (`Series`)
+- `local`: a session as `Session`, computed in this process
+- `Model`: SED of a map or many, computed in this process
 - `SpikeTrains`: when the touch units of a finger fire, as files
 - `sensors`: readings of an array of taxels to pressure, SED, rates and spikes
 - `devices`, `hjif`: what controllers and gloves take, and recorded touches as HJIF files
@@ -26,9 +28,12 @@ if TYPE_CHECKING:
         BadAddress,
         BadFrame,
         BadInput,
+        BadModels,
         Closed,
         FrameFailed,
         MissingExtra,
+        NativeFault,
+        NativeMissing,
         NotCarried,
         NotRendered,
         PapillaError,
@@ -36,6 +41,8 @@ if TYPE_CHECKING:
         Unreachable,
     )
     from .http import DEFAULT_URL, Indentation, indentation, post, sed
+    from .inprocess import LocalSession, local
+    from .model import Model
     from .rendering import render, render_chunks
     from .series import Series
     from .spikes import SpikeTrains
@@ -51,11 +58,16 @@ __all__ = [
     "BadAddress",
     "BadFrame",
     "BadInput",
+    "BadModels",
     "Closed",
     "Contact",
     "FrameFailed",
     "Indentation",
+    "LocalSession",
     "MissingExtra",
+    "Model",
+    "NativeFault",
+    "NativeMissing",
     "NotCarried",
     "NotRendered",
     "PapillaError",
@@ -72,6 +84,7 @@ __all__ = [
     "frames",
     "hjif",
     "indentation",
+    "local",
     "meshes",
     "post",
     "render",
@@ -91,9 +104,12 @@ _NAMES = {
         "BadAddress",
         "BadFrame",
         "BadInput",
+        "BadModels",
         "Closed",
         "FrameFailed",
         "MissingExtra",
+        "NativeFault",
+        "NativeMissing",
         "NotCarried",
         "NotRendered",
         "PapillaError",
@@ -101,6 +117,8 @@ _NAMES = {
         "Unreachable",
     ),
     "http": ("DEFAULT_URL", "Indentation", "indentation", "post", "sed"),
+    "inprocess": ("LocalSession", "local"),
+    "model": ("Model",),
     "rendering": ("render", "render_chunks"),
     "series": ("Series",),
     "spikes": ("SpikeTrains",),

@@ -6,10 +6,9 @@ import asyncio
 import json
 import logging
 import time
-from collections.abc import Sequence
 from concurrent.futures import Future
 from types import TracebackType
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,9 +19,10 @@ from . import answer as answers
 from . import check, wire
 from .address import Address, clean_token
 from .answer import Answer, Problem
+from .calls import NetForce
 from .errors import Closed, Refused, Unreachable
 from .http import DEFAULT_URL, refusal
-from .link import Frame, dial, questions
+from .link import Frame, dial, questions, told_beyond, told_refused
 from .wire import Window
 
 _PATIENCE_S: Final = 30.0
@@ -31,8 +31,6 @@ _MOVE_PATIENCE_S: Final = 5.0
 TIMEOUT_S: Final = 5.0
 """After so long a frame without an answer is `lost`."""
 _LOG: Final = logging.getLogger("papilla")
-NetForce: TypeAlias = tuple[Sequence[float], float]
-"""A unit vector in the finger's frame, and N along it."""
 
 
 class AsyncSession:
@@ -444,7 +442,7 @@ class AsyncSession:
         if frame is not None:
             tier = self._tiers.get(header.tier, "")
             if "out_of_range" in header.flags:
-                self._warn("out_of_range", f"pressure is beyond what tier {tier} knows; such answers are flagged")
+                self._warn("out_of_range", told_beyond(tier))
             frame.give(answers.read(message, header, frame.ready, tier))
 
     def _warn(self, code: str, words: str) -> None:
@@ -462,7 +460,7 @@ class AsyncSession:
         frame = self._sent.pop(message.get("sequence", -1), None)
         if frame is not None:
             problem = Problem(message["code"], message["message"], message.get("field"))
-            self._warn(problem.code, f"a frame was refused: {problem.message}")
+            self._warn(problem.code, told_refused(problem))
             frame.end("error", problem=problem)
         elif self._renewal is not None and not self._renewal.done():
             if message["type"] == "ready":

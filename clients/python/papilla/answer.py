@@ -53,7 +53,7 @@ class Touch(NamedTuple):
     solve_us: float
 
 
-def read_touch(message: bytes, offset: int) -> Touch:
+def read_touch(message: wire.Message, offset: int) -> Touch:
     """The touch at `offset`."""
     v = struct.unpack_from("<16f", message, offset)
     return Touch((v[0], v[1], v[2]), (v[3], v[4], v[5]), v[6], (v[7], v[8], v[9]), *v[10:])
@@ -74,7 +74,7 @@ _SPIKES_HEAD = struct.Struct("<II")
 _SPIKE = np.dtype([("unit", "<u2"), ("before_us", "<u2")])
 
 
-def read_spikes(message: bytes, offset: int, client_time_us: int) -> Spikes:
+def read_spikes(message: wire.Message, offset: int, client_time_us: int) -> Spikes:
     """The spikes at `offset`."""
     total, count = _SPIKES_HEAD.unpack_from(message, offset)
     found = np.frombuffer(message, _SPIKE, count, offset + _SPIKES_HEAD.size)
@@ -181,7 +181,7 @@ class Answer:
         return self.rates
 
 
-def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) -> Answer:
+def read(message: wire.Message, header: wire.Header, ready: dict[str, Any], tier: str) -> Answer:
     """The answer that a message is, in a session on the terms of `ready`."""
     answer = Answer(
         header.sequence,

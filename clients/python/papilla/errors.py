@@ -81,3 +81,24 @@ class MissingExtra(PapillaError, ImportError):
     def __init__(self, what: str, extra: str) -> None:
         super().__init__(f"{what} needs packages that are missing here: pip install 'papilla[{extra}]'")
         self.extra = extra
+
+
+class NativeMissing(PapillaError, ImportError):
+    """What computes in process needs the module `papilla._native`, which this installation lacks."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(
+            f"papilla._native cannot be loaded ({why}). It is in Papilla's wheels: install one, or build it with "
+            "clients/python/wheel. papilla.Session(url) needs no native module"
+        )
+
+
+class NativeFault(PapillaError):
+    """A fault of Papilla's own native code; the interpreter goes on."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(f"a fault of papilla._native, which is worth a report: {message}")
+
+
+class BadModels(PapillaError):
+    """A folder of models cannot be used; the message names the file, what is wrong and what to do."""

@@ -63,3 +63,13 @@ def questions(ready: dict[str, Any]) -> list[str]:
         meant = f"; it counts microseconds: were {budget_us} ms meant?" if budget_us < 100 else ""
         asked.append(f"{needs}, and budget_us is {budget_us}, so that frames may be late{meant}")
     return asked
+
+
+def told_beyond(tier: str) -> str:
+    """Said once of pressure beyond a tier's training."""
+    return f"pressure is beyond what tier {tier} knows; such answers are flagged"
+
+
+def told_refused(problem: Problem) -> str:
+    """Said once of frames that were refused."""
+    return f"a frame was refused: {problem.message}"

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Coroutine, Iterable, Iterator
+from collections.abc import Coroutine
 from concurrent.futures import Future
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .aio import TIMEOUT_S, AsyncSession, NetForce
+from .aio import TIMEOUT_S, AsyncSession
 from .answer import Answer
+from .calls import Calls, NetForce
 from .http import DEFAULT_URL
 from .wire import Window
-
-if TYPE_CHECKING:
-    from .send_series import Progress
-    from .series import Series
 
 _T = TypeVar("_T")
 
 
-class Session:
+class Session(Calls):
     """As `AsyncSession`, on a thread of its own; can be used from several threads.
 
     `with Session(tier="small") as session: session.render(pressure_pa).sed`
@@ -118,19 +115,6 @@ class Session:
             self._loop.call_soon_threadsafe(self._session.hand_over, frame)
         return frame.outcome
 
-    def render(
-        self,
-        pressure_pa: ArrayLike | None = None,
-        *,
-        window: Window | None = None,
-        client_time_us: int | None = None,
-        deadline_us: int = 0,
-        timeout_s: float | None = None,
-    ) -> Answer:
-        """`send`, and waits for the outcome; raises TimeoutError after `timeout_s`."""
-        sent = self.send(pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us)
-        return sent.result(timeout_s)
-
     def send_poses(
         self,
         poses: ArrayLike,
@@ -149,18 +133,6 @@ class Session:
             self._loop.call_soon_threadsafe(self._session.hand_over, frame)
         return frame.outcome
 
-    def not_tracked(self, *, finger: int = 0, timeout_s: float | None = None) -> Answer:
-        """`send_not_tracked`, and waits for the outcome."""
-        return self.send_not_tracked(finger=finger).result(timeout_s)
-
-    def touch(
-        self, poses: ArrayLike | None, *, finger: int = 0, net: NetForce | None = None, timeout_s: float | None = None
-    ) -> Answer:
-        """`send_poses`, and waits for the outcome; `.touch` holds the force. None: tracking is lost."""
-        if poses is None:
-            return self.not_tracked(finger=finger, timeout_s=timeout_s)
-        return self.send_poses(poses, finger=finger, net=net).result(timeout_s)
-
     def send_gaps(
         self,
         depth_mm: ArrayLike,
@@ -171,37 +143,6 @@ class Session:
     ) -> Future[Answer]:
         """Hands over gaps and returns at once; see `AsyncSession.send_gaps`."""
         return self._hand_over("gaps", depth_mm, finger, net, client_time_us)
-
-    def series(
-        self,
-        frames: ArrayLike | Iterable[ArrayLike],
-        times: ArrayLike | None = None,
-        *,
-        unit: str | None = None,
-        progress: Progress = None,
-    ) -> Series:
-        """Renders many frames in their order, none of which supersedes another; as `papilla.render`.
-
-        What the session remembers goes on from what it was. No other thread may send meanwhile.
-        """
-        # Whoever sends frame by frame does not pay for it.
-        from .send_series import on_session
-
-        return on_session(self, frames, times, unit=unit, progress=progress)
-
-    def series_chunks(
-        self,
-        frames: ArrayLike | Iterable[ArrayLike],
-        times: ArrayLike | None = None,
-        *,
-        chunk: int = 256,
-        unit: str | None = None,
-        progress: Progress = None,
-    ) -> Iterator[Series]:
-        """`series` for what does not fit in memory: a result for each `chunk` frames."""
-        from .send_series import chunks_on_session
-
-        return chunks_on_session(self, frames, times, chunk=chunk, unit=unit, progress=progress)
 
     @property
     def hello(self) -> dict[str, Any]:

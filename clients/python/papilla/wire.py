@@ -16,6 +16,8 @@ SIDE_PX: Final = 224
 """Pixels along one side of every map."""
 
 Map: TypeAlias = NDArray[np.float32]
+Message: TypeAlias = bytes | bytearray
+"""An answer: as a socket gave it, or as it was made in process."""
 Window: TypeAlias = tuple[int, int, int, int]
 """Column, row, width, height, pixels."""
 
@@ -87,6 +89,29 @@ def _head(
     )  # fmt: skip
 
 
+def parts(
+    pressure_pa: NDArray[Any],
+    window: Window,
+    sample_type: str,
+    sequence: int,
+    client_time_us: int,
+    deadline_us: int,
+) -> tuple[bytes, NDArray[Any]]:
+    """Header and samples of one pressure frame; `pressure_pa` has the window's shape."""
+    number, dtype, unit_max = _SAMPLES[sample_type]
+    scale = 1.0
+    if unit_max and pressure_pa.size:
+        # The finest scale that clips nothing; in f32, as the header carries it.
+        scale = float(np.float32(float(np.max(pressure_pa)) / unit_max)) or 1.0
+        with np.errstate(invalid="ignore"):
+            samples = np.clip(np.rint(pressure_pa / scale), 0.0, unit_max).astype(dtype)
+    elif sample_type == "f16":
+        samples = np.clip(pressure_pa, -65504.0, 65504.0).astype(dtype)
+    else:
+        samples = pressure_pa.astype(dtype, copy=False)
+    return _head(1, number, sequence, window, client_time_us, deadline_us, scale), samples
+
+
 def encode(
     pressure_pa: NDArray[Any],
     window: Window,
@@ -96,19 +121,8 @@ def encode(
     deadline_us: int,
 ) -> bytes:
     """The message of one pressure frame; `pressure_pa` has the window's shape."""
-    number, dtype, unit_max = _SAMPLES[sample_type]
-    scale = 1.0
-    if unit_max and pressure_pa.size:
-        # The finest scale that clips nothing; in f32, as the header carries it.
-        scale = float(np.float32(float(np.max(pressure_pa)) / unit_max)) or 1.0
-        with np.errstate(invalid="ignore"):
-            units = np.clip(np.rint(pressure_pa / scale), 0.0, unit_max)
-            samples = units.astype(dtype).tobytes()
-    elif sample_type == "f16":
-        samples = np.clip(pressure_pa, -65504.0, 65504.0).astype(dtype).tobytes()
-    else:
-        samples = pressure_pa.astype(dtype, copy=False).tobytes()
-    return _head(1, number, sequence, window, client_time_us, deadline_us, scale) + samples
+    head, samples = parts(pressure_pa, window, sample_type, sequence, client_time_us, deadline_us)
+    return head + samples.tobytes()
 
 
 def encode_rows(
@@ -146,7 +160,7 @@ FLAGS = {
 """Bits of an answer's flags."""
 
 
-def decode(message: bytes) -> Header:
+def decode(message: Message) -> Header:
     """Reads an answer's header.
 
     Raises ValueError if the message is none.
@@ -166,18 +180,24 @@ def decode(message: bytes) -> Header:
     )  # fmt: skip
 
 
-def floats(message: bytes, offset: int, size: int) -> Map:
+def floats(message: Message, offset: int, size: int) -> Map:
     """`size` bytes of float32 at `offset`."""
-    return np.frombuffer(message, "<f4", size // 4, offset).astype(np.float32)
+    return _values(message, "<f4", size // 4, offset)
 
 
-def samples(message: bytes, offset: int, header: Header) -> Map:
+def _values(message: Message, dtype: str, count: int, offset: int) -> Map:
+    """Values that can be written to: those of a session in process lie where Rust wrote them."""
+    values = np.frombuffer(message, dtype, count, offset)
+    return values.astype(np.float32, copy=isinstance(message, bytes))
+
+
+def samples(message: Message, offset: int, header: Header) -> Map:
     """The samples of the window, J/m3: (height, width)."""
     _, _, width, height = header.window
     return scaled(message, offset, width * height, header.sample_type, header.scale).reshape(height, width)
 
 
-def rates(message: bytes, offset: int, size: int, header: Header) -> Map:
+def rates(message: Message, offset: int, size: int, header: Header) -> Map:
     """The section `rates`, Hz: a whole map, or a value a vertex."""
     (scale,) = struct.unpack_from("<f", message, offset)
     count = (size - RATES_HEAD) // np.dtype(_SAMPLES[header.sample_type][1]).itemsize
@@ -185,10 +205,10 @@ def rates(message: bytes, offset: int, size: int, header: Header) -> Map:
     return values.reshape(SIDE_PX, SIDE_PX) if count == SIDE_PX * SIDE_PX else values
 
 
-def scaled(message: bytes, offset: int, count: int, sample_type: str, scale: float) -> Map:
+def scaled(message: Message, offset: int, count: int, sample_type: str, scale: float) -> Map:
     """`count` samples at `offset`, of which u16 and u8 carry units of `scale`."""
     _, dtype, unit_max = _SAMPLES[sample_type]
-    values = np.frombuffer(message, dtype, count, offset).astype(np.float32)
+    values = _values(message, dtype, count, offset)
     if unit_max:
         values *= np.float32(scale)
     return values

@@ -1,7 +1,8 @@
 //! Which frames a session takes.
 
 use papilla_proto::{
-    ErrorCode, FrameHeader, FrameKind, Hello, MAP_SIDE_PX, Problem, Window,
+    ErrorCode, FrameHeader, FrameKind, FrameStatus, Hello, MAP_SIDE_PX, Problem, SampleType,
+    Window,
     contact::{Input, ROW, SampleLayout},
 };
 
@@ -121,6 +122,31 @@ impl FrameForm {
         {
             let message = format!("the frame is {width} x {height}, {columns} x {rows} is due");
             return Err(Problem::new(ErrorCode::WrongShape, message).at("width"));
+        }
+        Ok(finger)
+    }
+
+    /// Checks all of a header that a session with samples of this type takes; gives its finger.
+    ///
+    /// # Errors
+    /// The first that does not fit; the problem names the field of the header.
+    pub fn accept(&self, header: &FrameHeader, due: SampleType) -> Result<usize, Problem> {
+        let wrong_type =
+            |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
+        let finger = self.check(header)?;
+        if header.status != FrameStatus::Ok {
+            return wrong_type("status", "the status of a request is 0".to_owned());
+        }
+        if header.sample_type != due && header.is_tracked() {
+            let message = format!("the hello announced {due:?}, not {:?}", header.sample_type);
+            return wrong_type("sample_type", message);
+        }
+        let window = header.window();
+        if self.is_window() && !window.is_inside() {
+            let Window { x, y, width, height } = window;
+            let message =
+                format!("the window of {width} x {height} at column {x}, row {y} leaves the map");
+            return Err(Problem::new(ErrorCode::WrongShape, message).at("x"));
         }
         Ok(finger)
     }

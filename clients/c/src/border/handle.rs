@@ -34,7 +34,7 @@ impl From<Problem> for Failure {
 
 impl From<LoadError> for Failure {
     fn from(error: LoadError) -> Self {
-        Self::new(error.status(), error.to_string())
+        Self::new(Status::from(&error), error.to_string())
     }
 }
 

@@ -11,7 +11,7 @@ use papilla_codec::{Input, Output};
 use papilla_metrics::{Stage, Transport};
 use papilla_proto::{
     ClientMessage, ErrorCode, FrameHeader, FrameStatus, HEADER_LEN, Problem, Reconnect,
-    ReconnectReason, ServerMessage, Window, contact::FINGERS_MAX,
+    ReconnectReason, ServerMessage, contact::FINGERS_MAX,
 };
 use tokio::{task::spawn_blocking, time::timeout};
 
@@ -237,7 +237,7 @@ impl Session {
     /// The job a frame asks for.
     fn job(&self, frame: &Bytes, received: Instant) -> Result<Job, Problem> {
         let header = FrameHeader::decode(frame).map_err(problem::of_frame)?;
-        let finger = self.check(&header)?;
+        let finger = self.terms.hand.form().accept(&header, self.terms.sample_type)?;
         let payload = frame.slice(HEADER_LEN..);
         let hand = &self.terms.hand;
         let due = hand.form().payload_len(&header);
@@ -278,30 +278,5 @@ impl Session {
                 header: Some(header),
             },
         })
-    }
-
-    /// Whether a header is that of a frame this session takes; the number of its finger.
-    fn check(&self, header: &FrameHeader) -> Result<usize, Problem> {
-        let wrong_type =
-            |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
-        let form = self.terms.hand.form();
-        let finger = form.check(header)?;
-        if header.status != FrameStatus::Ok {
-            return wrong_type("status", "the status of a request is 0".to_owned());
-        }
-        let sample_type = self.terms.sample_type;
-        if header.sample_type != sample_type && header.is_tracked() {
-            let message =
-                format!("the hello announced {sample_type:?}, not {:?}", header.sample_type);
-            return wrong_type("sample_type", message);
-        }
-        let window = header.window();
-        if form.is_window() && !window.is_inside() {
-            let Window { x, y, width, height } = window;
-            let message =
-                format!("the window of {width} x {height} at column {x}, row {y} leaves the map");
-            return Err(Problem::new(ErrorCode::WrongShape, message).at("x"));
-        }
-        Ok(finger)
     }
 }

@@ -16,8 +16,6 @@ use papilla_render::SkinPixels;
 use papilla_session_contact::{AssetsError, contact_errors};
 use papilla_session_effects as effects;
 
-use crate::Status;
-
 /// Why a folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -77,31 +75,21 @@ pub enum LoadError {
     },
 }
 
-impl LoadError {
-    /// The status it has at the border.
-    #[must_use]
-    pub const fn status(&self) -> Status {
-        match self {
-            Self::File { .. } => Status::NoFile,
-            Self::Unknown { .. } => Status::UnknownTier,
-            Self::Engine { .. }
-            | Self::Atlas { .. }
-            | Self::Contact { .. }
-            | Self::Errors { .. } => Status::BadModel,
-        }
-    }
-}
-
 /// A model that sessions share.
 pub struct Model {
-    pub(crate) atlas: Atlas,
-    pub(crate) skin: Arc<Raster>,
+    /// Which point of the finger each pixel is.
+    pub atlas: Atlas,
+    /// The skin of the atlas as a map.
+    pub skin: Arc<Raster>,
     pub(crate) interface: Raster,
     pub(crate) pixels: SkinPixels,
     pub(crate) shared: effects::Shared,
-    pub(crate) network: Arc<dyn papilla_engine::Model>,
-    pub(crate) card: Card,
-    pub(crate) contact: Option<Arc<ContactModel>>,
+    /// The network.
+    pub network: Arc<dyn papilla_engine::Model>,
+    /// What is known of the network.
+    pub card: Card,
+    /// What finds pressure from poses and gaps.
+    pub contact: Option<Arc<ContactModel>>,
     pub(crate) contact_errors: Option<ContactErrors>,
     pub(crate) pixel_skin: Option<Arc<PixelSkin>>,
     pub(crate) interface_skin: Option<Arc<InterfaceSkin>>,

@@ -1,0 +1,21 @@
+//! The module `papilla._native`: what the Python package computes by itself.
+//!
+//! Python hands over texts of JSON, bytes of the protocol and buffers of numbers; the package above
+//! makes numpy arrays and named tuples of what comes back. The interpreter's lock is released
+//! wherever something is computed, and a panic ends in `papilla.NativeFault`.
+
+mod border;
+mod models;
+mod session;
+
+use pyo3::prelude::*;
+
+/// What the Python package computes by itself.
+#[pymodule]
+#[pyo3(name = "_native")]
+fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<models::Models>()?;
+    module.add_class::<session::Session>()?;
+    Ok(())
+}

@@ -1,0 +1,168 @@
+"""A session in process has the methods of a session with a service, and its answers, bit for bit."""
+
+import dataclasses
+import inspect
+
+import numpy as np
+import pytest
+
+import papilla
+
+BALL = {"shape": {"shape": "sphere", "radius_mm": 10.0}}
+RUBBED = BALL | {"friction": 0.5}
+POSES = [[11.25, 0.0, -16.53 + depth_mm, 0, 0, 0, 1] for depth_mm in (-0.2, 0.2, 0.5, 0.8, 0.8, 0.3)]
+# What differs from one run of the same program to the next.
+TIMES = {"total_us", "queue_us", "infer_us"}
+
+
+def same(here, there):
+    """Whether two answers are the same but for what time they took."""
+    for field in dataclasses.fields(papilla.Answer):
+        if field.name in TIMES:
+            continue
+        one, other = getattr(here, field.name), getattr(there, field.name)
+        if field.name == "touch" and one is not None:
+            one, other = one._replace(solve_us=0.0), other._replace(solve_us=0.0)
+        parts = [(one, other)]
+        if isinstance(one, tuple):
+            parts = list(zip(one, other, strict=True))
+        for a, b in parts:
+            if isinstance(a, np.ndarray):
+                assert a.dtype == b.dtype and a.shape == b.shape, field.name
+                assert a.tobytes() == b.tobytes(), field.name
+            else:
+                assert type(a) is type(b) and repr(a) == repr(b), field.name
+
+
+def both(url, hello, frames):
+    """Sends frames to a service and in process; gives both answers to each."""
+    with papilla.Session(url, **hello) as there, papilla.local(**hello) as here:
+        for member in ("tier", "sections", "sample_type", "vertices", "atlas_hash", "method", "units", "warnings"):
+            assert here.ready.get(member) == there.ready.get(member), member
+        for frame in frames:
+            pair = frame(here), frame(there)
+            same(*pair)
+            yield pair
+
+
+def maps(pressure_pa, **more):
+    # A clock of the test's own, so that what goes by time goes the same way.
+    for number, share in enumerate((0.0, 0.3, 1.0, 1.7, 0.6)):
+        time_us = 1_000_000 + 10_000 * number
+        yield lambda session, s=share, t=time_us: session.render(pressure_pa * s, client_time_us=t, **more)
+
+
+@pytest.mark.parametrize(
+    "hello",
+    [
+        {"tier": "nano"},
+        {"tier": "small", "effects": ["summary", "afferents"]},
+        {"tier": "nano", "effects": ["contact_window"], "answer_sample_type": "u16"},
+        {"tier": "nano", "effects": ["spikes", "relaxation"], "map": False},
+        {"tier": "nano", "answer_layout": "vertices"},
+        *({"tier": "pico", "sample_type": kind} for kind in ("f16", "u16", "u8")),
+    ],
+    ids=lambda hello: "-".join(str(value) for value in hello.values()),
+)
+def test_maps_are_the_same_to_the_bit(url, pressure_pa, hello):
+    answers = list(both(url, hello, maps(pressure_pa)))
+    assert [here.status for here, _ in answers] == ["ok"] * 5
+    assert answers[0][0].no_contact and not answers[2][0].no_contact
+
+
+def test_parts_of_maps_are_the_same_to_the_bit(url, pressure_pa):
+    part, window = pressure_pa[90:120, 100:140], (100, 90, 40, 30)
+    hello = {"tier": "nano"}
+    answers = [here for here, _ in both(url, hello, maps(part, window=window))]
+    with papilla.local(**hello) as session:
+        assert np.array_equal(answers[2].sed, session.render(pressure_pa).sed)
+
+
+@pytest.mark.parametrize("hello", [{}, {"pressure": "map", "shear": True}, {"force_target": True}], ids=str)
+def test_touch_is_the_same_to_the_bit(url, hello):
+    net = ((0.0, 0.0, 1.0), 0.4) if "force_target" in hello else None
+    hello = {"tier": "nano", "input": "objects", "objects": [RUBBED if "shear" in hello else BALL], **hello}
+
+    def frames():
+        for number, pose in enumerate(POSES):
+            time_us = 1_000_000 + 10_000 * number
+            yield lambda s, p=pose, t=time_us: s.send_poses(p, net=net, client_time_us=t).result()
+        yield lambda s: s.touch(None)
+
+    answers = []
+    with papilla.Session(url, **hello) as there, papilla.local(**hello) as here:
+        assert here.ready["sections"] == there.ready["sections"]
+        for frame in frames():
+            one, other = frame(here), frame(there)
+            if not one.not_tracked:
+                same(one, other)
+            answers.append(one)
+    assert answers[3].touch.force_n[2] > 0.05 and answers[-1].not_tracked
+
+
+def test_gaps_are_the_same_to_the_bit(url):
+    rows, columns = np.mgrid[:224, :224]
+    depth_mm = (0.8 - ((rows - 104) ** 2 + (columns - 112) ** 2) / 1000.0).astype(np.float32)
+    frames = [lambda s, d=d: s.send_gaps(depth_mm - d, client_time_us=5).result() for d in (0.0, 0.2, 0.5)]
+    answers = list(both(url, {"tier": "nano", "input": "gaps", "input_layout": "map"}, frames))
+    assert answers[0][0].touch.area_mm2 > 0
+
+
+def test_what_cannot_be_is_refused_alike(url, pressure_pa):
+    bad = pressure_pa.copy()
+    bad[3, 3] = np.nan
+    frames = [lambda s: s.render(bad, client_time_us=1), lambda s: s.render(-pressure_pa, client_time_us=2)]
+    for here, _ in both(url, {"tier": "nano", "out_of_range": "refuse"}, frames):
+        assert (here.status == "error" and here.problem.field == "payload") or here.problem.message
+    for hello in ({"tier": "none"}, {"effects": ["none"]}, {"input": "objects"}, {"atlas_hash": "0"}):
+        found = []
+        for opened in (lambda h=hello: papilla.Session(url, **h), lambda h=hello: papilla.local(**h)):
+            with pytest.raises(papilla.PapillaError) as refused:
+                opened()
+            found.append(refused.value)
+        assert all(isinstance(each, papilla.Refused | papilla.BadModels) for each in found)
+    for member in ("budget_us", "stale_after_us"):
+        with pytest.raises(papilla.Refused, match="of a service"):
+            papilla.local(**{member: 9000})
+
+
+def test_a_series_is_the_same_to_the_bit(url, pressure_pa):
+    frames, times = np.stack([pressure_pa * share for share in np.linspace(0, 1, 12)]), np.arange(12) * 0.01
+    hello = {"tier": "nano", "effects": ["afferents"]}
+    with papilla.Session(url, **hello) as there, papilla.local(**hello) as here:
+        one, other = here.series(frames, times), there.series(frames, times)
+    assert one.sed.tobytes() == other.sed.tobytes() and one.rates_hz.tobytes() == other.rates_hz.tobytes()
+
+
+def test_both_sessions_have_the_same_methods():
+    def methods(kind):
+        public = {name: getattr(kind, name) for name in dir(kind) if not name.startswith("_")}
+        return {name: inspect.signature(value) if callable(value) else None for name, value in public.items()}
+
+    ours, theirs = methods(papilla.LocalSession), methods(papilla.Session)
+    assert set(theirs) <= set(ours) | {"timeout_s"}
+    assert {name: ours.get(name) for name in theirs if name != "timeout_s"} == {
+        name: signature for name, signature in theirs.items() if name != "timeout_s"
+    }
+
+
+def test_new_terms_and_the_end(pressure_pa):
+    with papilla.local(tier="nano") as session:
+        before = session.render(pressure_pa).sed
+        assert session.renew(tier="pico")["tier"] == "pico" and session.hello == {"tier": "pico"}
+        with pytest.raises(papilla.Refused):
+            session.renew(effects=["none"])
+        assert session.render(pressure_pa).tier == "pico"
+        assert not np.array_equal(session.render(pressure_pa).sed, before)
+    assert not session.connected
+    with pytest.raises(papilla.Closed):
+        session.render(pressure_pa)
+
+
+def test_answers_are_arrays_that_can_be_written_to_and_stay(pressure_pa):
+    with papilla.local(tier="nano") as session:
+        first = session.render(pressure_pa).sed
+        kept = first.copy()
+        session.render(pressure_pa * 0.5)
+        assert np.array_equal(first, kept)
+        first += 1

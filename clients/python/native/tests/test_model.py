@@ -1,0 +1,117 @@
+"""SED of maps and batches in process."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import papilla
+
+
+@pytest.fixture(scope="module")
+def model():
+    return papilla.Model("nano")
+
+
+def test_a_batch_is_its_maps_on_any_number_of_threads(model, pressure_pa):
+    batch = np.stack([pressure_pa * share for share in (0.0, 0.2, 0.5, 1.0, 40.0)])
+    singly = np.stack([model.sed(each) for each in batch])
+    for threads in (1, 3):
+        assert model.sed(batch, threads=threads).tobytes() == singly.tobytes()
+    rendered = model.render(batch.astype(np.float64)[:, ::1])
+    assert rendered.sed.tobytes() == singly.tobytes()
+    assert rendered.flagged("no_contact").tolist() == [True, False, False, False, False]
+    assert rendered.flagged("out_of_range").tolist() == [False, False, False, False, True]
+    assert model.sed(batch[:0]).shape == (0, 224, 224)
+
+
+def test_strided_maps_are_read_as_they_lie(model, pressure_pa):
+    wide = np.zeros((224, 448), np.float32)
+    wide[:, ::2] = pressure_pa
+    assert np.array_equal(model.sed(wide[:, ::2]), model.sed(pressure_pa))
+
+
+def test_bad_input_is_named(model, pressure_pa):
+    bad = np.stack([pressure_pa, pressure_pa])
+    bad[1, 5, 7] = np.inf
+    with pytest.raises(papilla.BadInput, match=r"frame 1: .*row 5, column 7") as refused:
+        model.sed(bad)
+    assert refused.value.frame == 1
+    with pytest.raises(papilla.BadInput, match="224 x 224"):
+        model.sed(np.zeros((8, 8)))
+    with pytest.raises(papilla.BadInput, match="due"):
+        model.sed(np.zeros((2, 8, 8)))
+    with pytest.raises(papilla.BadInput, match="real numbers"):
+        model.sed(np.full((224, 224), "x"))
+    with pytest.raises(papilla.BadInput, match="threads"):
+        model.sed(pressure_pa, threads=0)
+    assert np.array_equal(model.sed(pressure_pa), model.sed(pressure_pa))
+
+
+def test_bad_folders_are_named(tmp_path):
+    with pytest.raises(papilla.BadModels, match=r"index\.json"):
+        papilla.Model(models=tmp_path)
+    with pytest.raises(papilla.BadModels, match=r"lists .*nano"):
+        papilla.Model("none")
+
+
+def test_other_threads_of_python_go_on(model, pressure_pa):
+    batch = np.repeat(pressure_pa[None], 60, axis=0)
+    ticks, done = [], threading.Event()
+
+    def tick():
+        while not done.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.001)
+
+    beside = threading.Thread(target=tick)
+    beside.start()
+    model.sed(batch, threads=1)
+    done.set()
+    beside.join()
+    assert len(ticks) > 5
+
+
+def test_ctrl_c_ends_a_batch(pressure_pa):
+    program = """
+import numpy as np, papilla
+model = papilla.Model("small")
+batch = np.zeros((600, 224, 224), np.float32)
+batch[:, 95:115, 105:130] = 8e3
+print("ready", flush=True)
+try:
+    model.sed(batch)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert running.stdout.readline() == "ready\n"
+    time.sleep(1.0)
+    running.send_signal(signal.SIGINT)
+    assert running.communicate(timeout=60)[0] == "interrupted\n"
+
+
+def test_import_is_quick_and_the_client_works_without_the_native_module():
+    program = """
+import sys
+sys.modules["papilla._native"] = None
+import papilla
+papilla.Session, papilla.Model, papilla.local
+try:
+    papilla.Model("nano")
+except papilla.NativeMissing as error:
+    print("clients/python/wheel" in str(error))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
+
+
+def test_the_service_is_a_command():
+    beside = os.path.join(os.path.dirname(sys.executable), "papilla-server")
+    done = subprocess.run([beside, "--version"], capture_output=True, text=True, check=True)
+    assert papilla.model.native().__version__ in done.stdout

@@ -1,0 +1,128 @@
+"""What can be called on a session without asyncio, whether it has a service or is in process."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from numpy.typing import ArrayLike
+
+from .answer import Answer
+from .wire import Window
+
+if TYPE_CHECKING:
+    from .send_series import Progress
+    from .series import Series
+
+NetForce: TypeAlias = tuple[Sequence[float], float]
+"""A unit vector in the finger's frame, and N along it."""
+
+
+class Calls(ABC):
+    """Calls that wait, on top of those that hand over."""
+
+    timeout_s: float
+    """Time within which a frame has an outcome, s."""
+
+    @property
+    @abstractmethod
+    def warnings(self) -> list[str]: ...
+
+    @property
+    @abstractmethod
+    def ready(self) -> dict[str, Any]: ...
+
+    @property
+    @abstractmethod
+    def hello(self) -> dict[str, Any]: ...
+
+    @abstractmethod
+    def send(
+        self,
+        pressure_pa: ArrayLike | None = None,
+        *,
+        window: Window | None = None,
+        client_time_us: int | None = None,
+        deadline_us: int = 0,
+    ) -> Future[Answer]: ...
+
+    @abstractmethod
+    def send_poses(
+        self,
+        poses: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]: ...
+
+    @abstractmethod
+    def send_gaps(
+        self,
+        depth_mm: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]: ...
+
+    @abstractmethod
+    def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]: ...
+
+    def render(
+        self,
+        pressure_pa: ArrayLike | None = None,
+        *,
+        window: Window | None = None,
+        client_time_us: int | None = None,
+        deadline_us: int = 0,
+        timeout_s: float | None = None,
+    ) -> Answer:
+        """`send`, and waits for the outcome; raises TimeoutError after `timeout_s`."""
+        sent = self.send(pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us)
+        return sent.result(timeout_s)
+
+    def not_tracked(self, *, finger: int = 0, timeout_s: float | None = None) -> Answer:
+        """`send_not_tracked`, and waits for the outcome."""
+        return self.send_not_tracked(finger=finger).result(timeout_s)
+
+    def touch(
+        self, poses: ArrayLike | None, *, finger: int = 0, net: NetForce | None = None, timeout_s: float | None = None
+    ) -> Answer:
+        """`send_poses`, and waits for the outcome; `.touch` holds the force. None: tracking is lost."""
+        if poses is None:
+            return self.not_tracked(finger=finger, timeout_s=timeout_s)
+        return self.send_poses(poses, finger=finger, net=net).result(timeout_s)
+
+    def series(
+        self,
+        frames: ArrayLike | Iterable[ArrayLike],
+        times: ArrayLike | None = None,
+        *,
+        unit: str | None = None,
+        progress: Progress = None,
+    ) -> Series:
+        """Renders many frames in their order, none of which supersedes another; as `papilla.render`.
+
+        What the session remembers goes on from what it was. No other thread may send meanwhile.
+        """
+        # Whoever sends frame by frame does not pay for it.
+        from .send_series import on_session
+
+        return on_session(self, frames, times, unit=unit, progress=progress)
+
+    def series_chunks(
+        self,
+        frames: ArrayLike | Iterable[ArrayLike],
+        times: ArrayLike | None = None,
+        *,
+        chunk: int = 256,
+        unit: str | None = None,
+        progress: Progress = None,
+    ) -> Iterator[Series]:
+        """`series` for what does not fit in memory: a result for each `chunk` frames."""
+        from .send_series import chunks_on_session
+
+        return chunks_on_session(self, frames, times, chunk=chunk, unit=unit, progress=progress)

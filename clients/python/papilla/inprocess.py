@@ -1,0 +1,225 @@
+"""A session that is computed in this process."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import threading
+import time
+from concurrent.futures import Future
+from types import TracebackType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import answer as answers
+from . import check, wire
+from .answer import Answer, Problem
+from .calls import Calls, NetForce
+from .errors import Closed, Refused
+from .link import questions, told_beyond, told_refused
+from .model import Model
+from .wire import Window
+
+_LOG: Final = logging.getLogger("papilla")
+# No service reads them, so they mean nothing here: what a session does when its connection breaks.
+_OF_CONNECTIONS: Final = ("reconnect",)
+
+
+def _solves(hello: dict[str, Any]) -> bool:
+    """Whether a hello needs the contact model."""
+    return hello.get("input", "pressure") != "pressure" or "shear_energy" in hello.get("effects", ())
+
+
+class LocalSession(Calls):
+    """As `Session`, without a service: frames are rendered on the thread that sends them.
+
+    Nothing waits, so no frame is superseded, late or lost, and each future is done when it is given.
+    """
+
+    def __init__(
+        self, model: Model | None = None, *, models: str | os.PathLike[str] | None = None, **hello: Any
+    ) -> None:
+        self.url = "local"
+        self.timeout_s = float("inf")
+        self._models = models if model is None else model.folder
+        self._model = model
+        self._lock = threading.Lock()
+        self._sequence = 0
+        self._closed = False
+        self._warnings: list[str] = []
+        self._warned: set[str] = set()
+        self._agree(hello)
+
+    def __enter__(self) -> LocalSession:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the session."""
+        with self._lock:
+            self._closed = True
+            self._native.close()
+
+    @property
+    def ready(self) -> dict[str, Any]:
+        """What was agreed to: tier, ranges, sections, ..."""
+        return self._ready
+
+    @property
+    def hello(self) -> dict[str, Any]:
+        """The terms that this session asked for last."""
+        return dict(self._hello)
+
+    @property
+    def connected(self) -> bool:
+        """True until the session is closed."""
+        return not self._closed
+
+    @property
+    def connections(self) -> int:
+        """1: there is none that could break."""
+        return 1
+
+    @property
+    def superseded_by_client(self) -> int:
+        """0: each frame is rendered before the next can come."""
+        return 0
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was logged for people to read, each once."""
+        return self._warnings
+
+    @property
+    def model(self) -> Model:
+        """The network, to be shared with other sessions."""
+        assert self._model is not None
+        return self._model
+
+    def renew(self, **hello: Any) -> dict[str, Any]:
+        """Says hello again; raises Refused, and the old terms stand."""
+        with self._lock:
+            if self._closed:
+                raise Closed("the session is closed")
+            self._agree(hello)
+            return self._ready
+
+    def _agree(self, hello: dict[str, Any]) -> None:
+        model, tier, solves = self._model, hello.get("tier"), _solves(hello)
+        if model is None or tier not in (None, model.tier) or (solves and not model.has_contact):
+            model = Model(tier, models=self._models, contact=solves)
+        said = {name: value for name, value in hello.items() if name not in _OF_CONNECTIONS}
+        native = model.session({"type": "hello", "version": wire.VERSION, **said})
+        self._native, self._model, self._hello = native, model, hello
+        self._ready: dict[str, Any] = json.loads(native.ready())
+        for words in questions(self._ready):
+            self._warn(words, words)
+
+    def _warn(self, code: str, words: str) -> None:
+        if code not in self._warned:
+            self._warned.add(code)
+            self._warnings.append(words)
+            _LOG.warning("%s", words)
+
+    def send(
+        self,
+        pressure_pa: ArrayLike | None = None,
+        *,
+        window: Window | None = None,
+        client_time_us: int | None = None,
+        deadline_us: int = 0,
+    ) -> Future[Answer]:
+        """Renders one frame; see `AsyncSession.send`. No deadline is missed here."""
+        if pressure_pa is None:
+            pressure_pa, window = np.zeros((0, 0), np.float32), window or (0, 0, 0, 0)
+        window = window or wire.WHOLE
+        samples = check.samples(pressure_pa, window)
+        with self._lock:
+            sequence, time_us = self._next(client_time_us)
+            sample_type = self._ready["sample_type"]
+            head, samples = wire.parts(samples, window, sample_type, sequence, time_us, deadline_us)
+            return self._frame(head, _bytes(samples), sequence, time_us, 0)
+
+    def send_poses(
+        self,
+        poses: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
+        """Renders where objects are; see `AsyncSession.send_poses`."""
+        return self._rows("objects", poses, finger, net, client_time_us)
+
+    def send_gaps(
+        self,
+        depth_mm: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
+        """Renders gaps; see `AsyncSession.send_gaps`."""
+        return self._rows("gaps", depth_mm, finger, net, client_time_us)
+
+    def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]:
+        """Tells that tracking is lost; see `AsyncSession.send_not_tracked`."""
+        with self._lock:
+            sequence, time_us = self._next(None)
+            return self._frame(wire.encode_not_tracked(finger, sequence, time_us), b"", sequence, time_us, finger)
+
+    def _rows(
+        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
+    ) -> Future[Answer]:
+        rows = np.atleast_2d(np.asarray(values, np.float32))
+        row = None if net is None else np.array([*net[0], net[1], 0.0, 0.0, 0.0], np.float32)
+        with self._lock:
+            sequence, time_us = self._next(client_time_us)
+            message = wire.encode_rows(kind, rows, row, finger, sequence, time_us)
+            head, samples = message[: wire.HEADER.size], memoryview(message)[wire.HEADER.size :]
+            return self._frame(head, samples, sequence, time_us, finger)
+
+    def _next(self, client_time_us: int | None) -> tuple[int, int]:
+        if self._closed:
+            raise Closed("the session is closed")
+        self._sequence = (self._sequence + 1) % 2**32
+        return self._sequence, time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
+
+    def _frame(
+        self, head: bytes, samples: bytes | memoryview, sequence: int, time_us: int, finger: int
+    ) -> Future[Answer]:
+        outcome: Future[Answer] = Future()
+        try:
+            message = self._native.frame(head, samples)
+        except Refused as refused:
+            problem = Problem(refused.code, refused.message, refused.field)
+            self._warn(problem.code, told_refused(problem))
+            outcome.set_result(Answer(sequence, "error", time_us, problem=problem, finger=finger))
+            return outcome
+        header, tier = wire.decode(message), self._ready["tier"]
+        if "out_of_range" in header.flags:
+            self._warn("out_of_range", told_beyond(tier))
+        outcome.set_result(answers.read(message, header, self._ready, tier))
+        return outcome
+
+
+def _bytes(samples: NDArray[Any]) -> bytes | memoryview:
+    """Samples as the bytes that they lie in, copied only where they are apart."""
+    return np.ascontiguousarray(samples).data.cast("B") if samples.size else b""
+
+
+def local(model: Model | None = None, *, models: str | os.PathLike[str] | None = None, **hello: Any) -> LocalSession:
+    """A session in this process, with the methods and the answers of `Session(url)`.
+
+    `with papilla.local(tier="small") as session: session.render(pressure_pa).sed`
+
+    `models` is a folder of models, by default that of the wheel; `model` is one that is loaded already. The
+    rest are members of the hello, as for `Session`; `budget_us`, `stale_after_us` and `resume` are refused,
+    because nothing waits or travels here. Raises Refused, BadModels and NativeMissing.
+    """
+    return LocalSession(model, models=models, **hello)

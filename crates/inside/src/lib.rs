@@ -1,0 +1,29 @@
+//! Papilla inside a program: a folder of models read once, and sessions that render on the caller's
+//! thread. The native library for C and the Python package stand on it.
+//!
+//! [`Session`] takes the protocol's hello and frames as the service does, and makes the same
+//! sections of an answer; only sockets, queues and deadlines are missing.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
+//! use papilla_inside::{Frame, Model, Session, read_hello};
+//!
+//! let model = Model::load("models".as_ref(), Some("nano"), None)?.into();
+//! let mut session = Session::open(&model, &read_hello(r#"{"type": "hello"}"#)?)?;
+//! let mut pressure_pa = vec![0.0; 224 * 224];
+//! (95..115).for_each(|row| pressure_pa[row * 224 + 105..][..25].fill(8e3));
+//! session.render(0, Frame::Map(&pressure_pa), 0)?;
+//! assert!(session.sed_j_per_m3().iter().any(|sed| *sed > 0.0));
+//! # Ok(())
+//! # }
+//! ```
+
+mod hello;
+mod model;
+mod session;
+
+pub use hello::read_hello;
+pub use model::{LoadError, Model};
+pub use papilla_proto::Problem;
+pub use session::{Frame, Made, Session};
