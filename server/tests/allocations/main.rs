@@ -9,6 +9,9 @@
 #![allow(unsafe_code)]
 
 // Shared with the service's tests, which use all of it.
+#[allow(dead_code)]
+#[path = "../service/fingers/support.rs"]
+mod named_fingers;
 #[allow(dead_code, unused_imports)]
 #[path = "../service/support/mod.rs"]
 mod support;
@@ -245,6 +248,10 @@ fn a_warm_session_allocates_nothing_for_a_frame() {
     fingers(&service);
     felt_traction(&service, engines_own);
     runtime.block_on(service.server.drain()).unwrap();
+    let folder = named_fingers::folder();
+    let service = runtime.block_on(named_fingers::service(&folder));
+    fingers_of(&service, &json!([{"name": "default"}, {"name": "thumb"}]));
+    runtime.block_on(service.server.drain()).unwrap();
 }
 
 fn one_frame_at_a_time(service: &Service, engines_own: u64) {
@@ -289,7 +296,14 @@ fn frames_that_wait(service: &Service, engines_own: u64) {
 
 /// Two fingers under a ball that moves, forces out alone: nothing is left to the engine.
 fn fingers(service: &Service) {
-    let members = json!({"map": false, "stiffness": true, "fingers": [{}, {}]});
+    fingers_of(service, &json!([{}, {}]));
+}
+
+/// The same of these fingers, which may be of different bundles; each keeps its budget.
+fn fingers_of(service: &Service, fingers: &Value) {
+    let budget_us = 5_000_000;
+    let members =
+        json!({"map": false, "stiffness": true, "fingers": fingers, "budget_us": budget_us});
     let mut client = Client::connect(service, &contact::ball_hello(&members));
     let frame = |n: u32| {
         let depth_mm = 0.2 + 0.001 * (n % 20) as f32;

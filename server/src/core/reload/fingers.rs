@@ -117,8 +117,13 @@ impl Reloader {
             return Err(problem);
         }
         self.try_finger(name).map_err(|error| {
-            tracing::error!(finger = name, %error, "not loaded");
             let is_unusable = matches!(error, FingerError::Unusable { .. });
+            if is_unusable {
+                tracing::error!(finger = name, %error, "not loaded");
+            } else {
+                // Any client can ask for any name.
+                tracing::debug!(finger = name, %error, "not loaded");
+            }
             let problem = error.into();
             if is_unusable {
                 self.failed.note(name, &problem);
