@@ -13,9 +13,14 @@ Graph = dict[str, dict[str, str]]
 
 
 def modules(folder: Path, package: str) -> dict[str, Path]:
-    """Each module by the name that others import it by; a package is its `__init__`."""
+    """Each module by the name that others import it by; a package is its `__init__`.
+
+    A native module stands as its stub (`.pyi`).
+    """
     found = {}
-    for path in sorted(folder.rglob("*.py")):
+    for path in sorted(folder.rglob("*.py*")):
+        if path.suffix not in (".py", ".pyi"):
+            continue
         parts = [*package.split("."), *path.relative_to(folder).with_suffix("").parts]
         found[".".join(p for p in parts if p and p != "__init__")] = path
     return found
