@@ -115,12 +115,19 @@ pub fn write(folder: &Path, operator: &InfluenceOperator, card: &Card) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
+    use papilla_fingertip::geometry::fingertip::FingertipShape;
     use papilla_fingertip::influence::{body, build};
     use papilla_output::npz::NpzArrays;
 
     #[test]
     fn files_hold_what_the_contract_says() {
-        let body = body(Density::Coarse, Order::Linear, &TissueTable::default()).unwrap();
+        let body = body(
+            &FingertipShape::default(),
+            Density::Coarse,
+            Order::Linear,
+            &TissueTable::default(),
+        )
+        .unwrap();
         let operator = &build(&body, &mut |_| ()).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let materials = TissueTable::default();
