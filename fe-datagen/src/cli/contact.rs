@@ -42,7 +42,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         modes: args.modes,
         outputs: args.outputs,
     };
-    atomic::create_folder(&args.out)?;
     println!("{}", write(&recipe, &args.out)?);
     Ok(ExitCode::SUCCESS)
 }
@@ -66,6 +65,8 @@ pub(super) fn write(recipe: &Recipe<'_>, folder: &std::path::Path) -> anyhow::Re
         }
     })?;
     drop(progress);
+    // Not before: what is refused leaves nothing behind.
+    atomic::create_folder(folder)?;
     let path = folder.join("finger.contact");
     atomic::write(&path, &made.bytes)?;
     Ok(format!(

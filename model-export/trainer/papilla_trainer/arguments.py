@@ -16,7 +16,7 @@ Trains a network that maps fingertip pressure to strain energy density (SED) and
 
 From a dataset to a model that the server loads:
 
-  python -m papilla_trainer train    --dataset data/broad-graded --network s1-base8 --out runs/s1-base8
+  python -m papilla_trainer train --dataset data/broad-graded --network s1-base8 --out runs/s1-base8
   python -m papilla_trainer export   runs/s1-base8 --onnx runs/s1-base8/s1-base8.onnx
   python -m papilla_trainer check    runs/s1-base8/s1-base8.onnx --dataset data/broad-graded \\
                                      --run runs/s1-base8
