@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import logging
 import time
 from concurrent.futures import Future
 from types import TracebackType
@@ -19,18 +18,16 @@ from . import answer as answers
 from . import check, wire
 from .address import Address, clean_token
 from .answer import Answer, Problem
-from .calls import NetForce
 from .errors import Closed, Refused, Unreachable
 from .http import DEFAULT_URL, refusal
-from .link import Frame, dial, questions, told_beyond, told_refused
-from .wire import Window
+from .link import Frame, Warned, dial, questions, told_beyond, told_refused
+from .wire import NetForce, Window
 
 _PATIENCE_S: Final = 30.0
 _RETRY_S: Final = 0.15
 _MOVE_PATIENCE_S: Final = 5.0
 TIMEOUT_S: Final = 5.0
 """After so long a frame without an answer is `lost`."""
-_LOG: Final = logging.getLogger("papilla")
 
 
 class AsyncSession:
@@ -60,7 +57,8 @@ class AsyncSession:
         """Frames that a newer one replaced before they left."""
         self.connections = 0
         """Times that a session was opened; more than 1 after a reconnect."""
-        self.warnings: list[str] = []
+        self._warned = Warned()
+        self.warnings = self._warned.words
         """What was logged for people to read: each question of the service's, and each odd answer, once."""
         self.timeout_s = timeout_s
         """Time within which a frame has an outcome, s; may be changed."""
@@ -81,7 +79,6 @@ class AsyncSession:
         self._sealed: asyncio.Future[bytes] | None = None
         self._closed = False
         self._fault: Refused | None = None
-        self._warned: set[str] = set()
 
     async def __aenter__(self) -> AsyncSession:
         await self.open()
@@ -169,10 +166,7 @@ class AsyncSession:
         deadline_us: int,
     ) -> Frame:
         self._check_open()
-        if pressure_pa is None:
-            pressure_pa, window = np.zeros((0, 0), np.float32), window or (0, 0, 0, 0)
-        window = window or wire.WHOLE
-        samples = check.samples(pressure_pa, window)
+        samples, window = check.pressure(pressure_pa, window)
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
         kind = self.ready["sample_type"]
@@ -238,8 +232,7 @@ class AsyncSession:
         self._check_open()
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
-        row = None if net is None else np.array([*net[0], net[1], 0.0, 0.0, 0.0], np.float32)
-        message = wire.encode_rows(kind, rows, row, finger, self._sequence, time_us)
+        message = wire.encode_rows(kind, rows, net, finger, self._sequence, time_us)
         return Frame(self._sequence, time_us, message, finger)
 
     def encode_not_tracked(self, finger: int) -> Frame:
@@ -357,7 +350,7 @@ class AsyncSession:
         self._tiers.update(enumerate(ready.get("tier_names", [])))
         self._tiers.setdefault(ready["tier_number"], ready["tier"])
         for words in questions(ready):
-            self._warn(words, words)
+            self._warned.once(words, words)
 
     async def _live(self) -> None:
         """Reads until the connection breaks, and then opens another."""
@@ -413,7 +406,7 @@ class AsyncSession:
                 self._socket.transport.abort()
 
     def _time_out(self, frame: Frame) -> None:
-        self._warn("timeout", f"no answer within {self.timeout_s:g} s; such frames are lost")
+        self._warned.once("timeout", f"no answer within {self.timeout_s:g} s; such frames are lost")
         self._lose(frame)
 
     def _lose_sent(self) -> None:
@@ -442,15 +435,8 @@ class AsyncSession:
         if frame is not None:
             tier = self._tiers.get(header.tier, "")
             if "out_of_range" in header.flags:
-                self._warn("out_of_range", told_beyond(tier))
+                self._warned.once("out_of_range", told_beyond(tier))
             frame.give(answers.read(message, header, frame.ready, tier))
-
-    def _warn(self, code: str, words: str) -> None:
-        """Says once in a session what a program that looks at maps alone would not see."""
-        if code not in self._warned:
-            self._warned.add(code)
-            self.warnings.append(words)
-            _LOG.warning("%s", words)
 
     def _told(self, message: dict[str, Any]) -> None:
         if message["type"] == "reconnect":
@@ -460,7 +446,7 @@ class AsyncSession:
         frame = self._sent.pop(message.get("sequence", -1), None)
         if frame is not None:
             problem = Problem(message["code"], message["message"], message.get("field"))
-            self._warn(problem.code, told_refused(problem))
+            self._warned.once(problem.code, told_refused(problem))
             frame.end("error", problem=problem)
         elif self._renewal is not None and not self._renewal.done():
             if message["type"] == "ready":

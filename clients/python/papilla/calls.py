@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
 from .answer import Answer
-from .wire import Window
+from .wire import NetForce, Window
 
 if TYPE_CHECKING:
     from .send_series import Progress
     from .series import Series
-
-NetForce: TypeAlias = tuple[Sequence[float], float]
-"""A unit vector in the finger's frame, and N along it."""
 
 
 class Calls(ABC):
@@ -49,6 +46,11 @@ class Calls(ABC):
     ) -> Future[Answer]: ...
 
     @abstractmethod
+    def _hand_over(
+        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
+    ) -> Future[Answer]:
+        """Hands over rows of the hello's `input`: `objects` or `gaps`."""
+
     def send_poses(
         self,
         poses: ArrayLike,
@@ -56,9 +58,10 @@ class Calls(ABC):
         finger: int = 0,
         net: NetForce | None = None,
         client_time_us: int | None = None,
-    ) -> Future[Answer]: ...
+    ) -> Future[Answer]:
+        """Hands over where objects are; see `AsyncSession.send_poses`."""
+        return self._hand_over("objects", poses, finger, net, client_time_us)
 
-    @abstractmethod
     def send_gaps(
         self,
         depth_mm: ArrayLike,
@@ -66,7 +69,9 @@ class Calls(ABC):
         finger: int = 0,
         net: NetForce | None = None,
         client_time_us: int | None = None,
-    ) -> Future[Answer]: ...
+    ) -> Future[Answer]:
+        """Hands over gaps; see `AsyncSession.send_gaps`."""
+        return self._hand_over("gaps", depth_mm, finger, net, client_time_us)
 
     @abstractmethod
     def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]: ...

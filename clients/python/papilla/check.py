@@ -43,6 +43,14 @@ def samples(pressure_pa: ArrayLike, window: Window) -> Map:
     return array.astype(np.float32, copy=False)
 
 
+def pressure(pressure_pa: ArrayLike | None, window: Window | None) -> tuple[Map, Window]:
+    """Samples and window of a frame of pressure: without a window the whole map, without pressure no contact."""
+    if pressure_pa is None:
+        pressure_pa, window = np.zeros((0, 0), np.float32), window or (0, 0, 0, 0)
+    window = window or WHOLE
+    return samples(pressure_pa, window), window
+
+
 def _cure(shape: tuple[int, ...]) -> str:
     """What to do with an array that is no map."""
     whole = f"a map of the finger has {SIDE_PX} x {SIDE_PX} pixels"

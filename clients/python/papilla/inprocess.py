@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import os
 import threading
 import time
@@ -17,13 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from . import answer as answers
 from . import check, wire
 from .answer import Answer, Problem
-from .calls import Calls, NetForce
+from .calls import Calls
 from .errors import Closed, Refused
-from .link import questions, told_beyond, told_refused
+from .link import Warned, questions, told_beyond, told_refused
 from .model import Model
-from .wire import Window
+from .wire import NetForce, Window
 
-_LOG: Final = logging.getLogger("papilla")
 # No service reads them, so they mean nothing here: what a session does when its connection breaks.
 _OF_CONNECTIONS: Final = ("reconnect",)
 
@@ -49,8 +47,7 @@ class LocalSession(Calls):
         self._lock = threading.Lock()
         self._sequence = 0
         self._closed = False
-        self._warnings: list[str] = []
-        self._warned: set[str] = set()
+        self._warned = Warned()
         self._agree(hello)
 
     def __enter__(self) -> LocalSession:
@@ -93,7 +90,7 @@ class LocalSession(Calls):
     @property
     def warnings(self) -> list[str]:
         """What was logged for people to read, each once."""
-        return self._warnings
+        return self._warned.words
 
     @property
     def model(self) -> Model:
@@ -118,13 +115,7 @@ class LocalSession(Calls):
         self._native, self._model, self._hello = native, model, hello
         self._ready: dict[str, Any] = json.loads(native.ready())
         for words in questions(self._ready):
-            self._warn(words, words)
-
-    def _warn(self, code: str, words: str) -> None:
-        if code not in self._warned:
-            self._warned.add(code)
-            self._warnings.append(words)
-            _LOG.warning("%s", words)
+            self._warned.once(words, words)
 
     def send(
         self,
@@ -135,37 +126,12 @@ class LocalSession(Calls):
         deadline_us: int = 0,
     ) -> Future[Answer]:
         """Renders one frame; see `AsyncSession.send`. No deadline is missed here."""
-        if pressure_pa is None:
-            pressure_pa, window = np.zeros((0, 0), np.float32), window or (0, 0, 0, 0)
-        window = window or wire.WHOLE
-        samples = check.samples(pressure_pa, window)
+        samples, window = check.pressure(pressure_pa, window)
         with self._lock:
             sequence, time_us = self._next(client_time_us)
             sample_type = self._ready["sample_type"]
             head, samples = wire.parts(samples, window, sample_type, sequence, time_us, deadline_us)
             return self._frame(head, _bytes(samples), sequence, time_us, 0)
-
-    def send_poses(
-        self,
-        poses: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
-    ) -> Future[Answer]:
-        """Renders where objects are; see `AsyncSession.send_poses`."""
-        return self._rows("objects", poses, finger, net, client_time_us)
-
-    def send_gaps(
-        self,
-        depth_mm: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
-    ) -> Future[Answer]:
-        """Renders gaps; see `AsyncSession.send_gaps`."""
-        return self._rows("gaps", depth_mm, finger, net, client_time_us)
 
     def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]:
         """Tells that tracking is lost; see `AsyncSession.send_not_tracked`."""
@@ -173,14 +139,13 @@ class LocalSession(Calls):
             sequence, time_us = self._next(None)
             return self._frame(wire.encode_not_tracked(finger, sequence, time_us), b"", sequence, time_us, finger)
 
-    def _rows(
+    def _hand_over(
         self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
     ) -> Future[Answer]:
         rows = np.atleast_2d(np.asarray(values, np.float32))
-        row = None if net is None else np.array([*net[0], net[1], 0.0, 0.0, 0.0], np.float32)
         with self._lock:
             sequence, time_us = self._next(client_time_us)
-            message = wire.encode_rows(kind, rows, row, finger, sequence, time_us)
+            message = wire.encode_rows(kind, rows, net, finger, sequence, time_us)
             head, samples = message[: wire.HEADER.size], memoryview(message)[wire.HEADER.size :]
             return self._frame(head, samples, sequence, time_us, finger)
 
@@ -198,12 +163,12 @@ class LocalSession(Calls):
             message = self._native.frame(head, samples)
         except Refused as refused:
             problem = Problem(refused.code, refused.message, refused.field)
-            self._warn(problem.code, told_refused(problem))
+            self._warned.once(problem.code, told_refused(problem))
             outcome.set_result(Answer(sequence, "error", time_us, problem=problem, finger=finger))
             return outcome
         header, tier = wire.decode(message), self._ready["tier"]
         if "out_of_range" in header.flags:
-            self._warn("out_of_range", told_beyond(tier))
+            self._warned.once("out_of_range", told_beyond(tier))
         outcome.set_result(answers.read(message, header, self._ready, tier))
         return outcome
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 import time
 from concurrent.futures import Future
@@ -11,6 +12,7 @@ from typing import Any, Final
 from .answer import Answer, Problem
 
 _SOCKET_BYTES: Final = 512 * 1024
+_LOG: Final = logging.getLogger("papilla")
 
 
 class Frame:
@@ -52,6 +54,21 @@ async def dial(host: str, port: int) -> socket.socket:
             raw.close()
             last = error
     raise last
+
+
+class Warned:
+    """What was logged for people to read, each once."""
+
+    def __init__(self) -> None:
+        self.words: list[str] = []
+        self._codes: set[str] = set()
+
+    def once(self, code: str, words: str) -> None:
+        """Logs `words`, unless something with this code was told before."""
+        if code not in self._codes:
+            self._codes.add(code)
+            self.words.append(words)
+            _LOG.warning("%s", words)
 
 
 def questions(ready: dict[str, Any]) -> list[str]:

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from .aio import TIMEOUT_S, AsyncSession
 from .answer import Answer
-from .calls import Calls, NetForce
+from .calls import Calls
 from .http import DEFAULT_URL
-from .wire import Window
+from .wire import NetForce, Window
 
 _T = TypeVar("_T")
 
@@ -115,34 +115,12 @@ class Session(Calls):
             self._loop.call_soon_threadsafe(self._session.hand_over, frame)
         return frame.outcome
 
-    def send_poses(
-        self,
-        poses: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
-    ) -> Future[Answer]:
-        """Hands over where objects are and returns at once; see `AsyncSession.send_poses`."""
-        return self._hand_over("objects", poses, finger, net, client_time_us)
-
     def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]:
         """Hands over that tracking is lost and returns at once; see `AsyncSession.send_not_tracked`."""
         with self._lock:
             frame = self._session.encode_not_tracked(finger)
             self._loop.call_soon_threadsafe(self._session.hand_over, frame)
         return frame.outcome
-
-    def send_gaps(
-        self,
-        depth_mm: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
-    ) -> Future[Answer]:
-        """Hands over gaps and returns at once; see `AsyncSession.send_gaps`."""
-        return self._hand_over("gaps", depth_mm, finger, net, client_time_us)
 
     @property
     def hello(self) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -20,6 +21,8 @@ Message: TypeAlias = bytes | bytearray
 """An answer: as a socket gave it, or as it was made in process."""
 Window: TypeAlias = tuple[int, int, int, int]
 """Column, row, width, height, pixels."""
+NetForce: TypeAlias = tuple[Sequence[float], float]
+"""A unit vector in the finger's frame, and N along it."""
 
 WHOLE: Final[Window] = (0, 0, SIDE_PX, SIDE_PX)
 HEADER: Final = struct.Struct("<4sBBBBIHHQIfHHIIHBB")
@@ -128,19 +131,19 @@ def encode(
 def encode_rows(
     kind: str,
     rows: NDArray[Any],
-    net: NDArray[Any] | None,
+    net: NetForce | None,
     finger: int,
     sequence: int,
     client_time_us: int,
 ) -> bytes:
     """The message of poses (`rows` of seven) or of gaps (a row of them, or a map), as f32.
 
-    `net` is the row of seven of a net force, or None.
+    A net force follows as a row of seven.
     """
     height, width = rows.shape
     samples = rows.astype("<f4").tobytes()
     if net is not None:
-        samples += net.astype("<f4").tobytes()
+        samples += np.array([*net[0], net[1], 0.0, 0.0, 0.0], "<f4").tobytes()
         height += kind == "objects"
     window = (0, 0, width, height)
     return _head(INPUTS[kind], 0, sequence, window, client_time_us, 0, 1.0, finger=finger) + samples
