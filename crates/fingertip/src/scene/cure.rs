@@ -1,13 +1,32 @@
 //! What errors of scenes and of fingers' files say alike: the cure, and the field to blame.
 
 use super::materials::TissueError;
+use super::origin::{Origin, Place};
 use crate::materials::MaterialError;
 
+/// What a parser's error says of the file at `origin`, with the cure, and the place to blame if there
+/// is one; `page` tells of the fields.
+pub(super) fn parsed(
+    origin: &Origin,
+    error: &toml::de::Error,
+    page: &str,
+) -> (String, Option<Place>) {
+    let said = error.message();
+    let cure = cure(said, page);
+    match origin.blamed(error.span(), said) {
+        Some((field, place)) => {
+            let colon = if field.is_empty() { "" } else { ": " };
+            (format!("{field}{colon}{said}{cure}"), Some(place))
+        }
+        None => (format!("{said}{cure}"), None),
+    }
+}
+
 /// What to do about a parser's message, where it does not say so itself.
-pub(super) fn cure(message: &str) -> String {
+fn cure(message: &str, page: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     if let (Some(missing), true) = (quoted.first(), message.starts_with("missing field")) {
-        return format!(": add it (docs/reference/scenes.md has `{missing}` with its unit)");
+        return format!(": add it ({page} has `{missing}` with its unit)");
     }
     if message.starts_with("unknown field") {
         let meant =

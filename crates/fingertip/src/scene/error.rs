@@ -1,6 +1,6 @@
 //! Why a scene was refused.
 
-use super::cure::{cure, material_field};
+use super::cure::{material_field, parsed};
 use super::materials::TissueError;
 use super::origin::{Located, Origin, Place};
 use crate::indenter::IndenterError;
@@ -80,17 +80,9 @@ pub enum SceneError {
 impl SceneError {
     /// What a parser's error says of the scene at `origin`.
     pub(super) fn parse(origin: &Origin, error: &toml::de::Error) -> Self {
-        let said = error.message();
-        match origin.blamed(error.span(), said) {
-            Some((field, place)) => {
-                let colon = if field.is_empty() { "" } else { ": " };
-                let message = format!("{field}{colon}{said}{}", cure(said));
-                Self::Parse { message }.with(Some(place))
-            }
-            None => Self::Incomplete {
-                path: origin.path().into(),
-                message: format!("{said}{}", cure(said)),
-            },
+        match parsed(origin, error, "docs/reference/scenes.md") {
+            (message, None) => Self::Incomplete { path: origin.path().into(), message },
+            (message, place) => Self::Parse { message }.with(place),
         }
     }
 

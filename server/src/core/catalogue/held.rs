@@ -8,9 +8,9 @@ use std::{
 use papilla_engine::Model;
 use papilla_proto::Problem;
 
-/// For so long after a failure nobody has the model loaded again: whoever names its tier hears the
-/// same.
-const RETRY_AFTER: Duration = Duration::from_secs(10);
+/// For so long after a failure nobody has a model, or a finger, loaded again: whoever names it hears
+/// the same.
+pub(crate) const RETRY_AFTER: Duration = Duration::from_secs(10);
 
 /// A model, once it is loaded.
 #[derive(Default)]

@@ -31,7 +31,7 @@ use self::{
     replay::Replay,
 };
 pub(crate) use self::{
-    held::Held,
+    held::{Held, RETRY_AFTER},
     load::{Loading, ReadCard, Similar},
     tier::{NamedOnly, Tier, TrainedOn},
 };

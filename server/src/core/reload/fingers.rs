@@ -20,13 +20,11 @@ use super::{Changes, ReloadError, Reloader, Renewed, Turn};
 use crate::{
     StartError,
     core::{
-        catalogue::{Catalogue, Loading, assets::FINGER, calibrate},
+        catalogue::{Catalogue, Loading, RETRY_AFTER, assets::FINGER, calibrate},
         fingers::{self, Bundle, BundleError, FingerError, Loaded, Memory, Named},
     },
 };
 
-/// For so long after a failure nobody has the finger loaded again: whoever names it hears the same.
-const RETRY_AFTER: Duration = Duration::from_secs(10);
 /// Failures that are remembered.
 const FAILED_MAX: usize = 16;
 

@@ -1,6 +1,6 @@
 //! Why a finger's file was refused.
 
-use super::super::cure::{cure, material_field};
+use super::super::cure::{material_field, parsed};
 use super::super::materials::TissueError;
 use super::super::origin::{Located, Origin};
 use super::fields::FIELDS;
@@ -98,16 +98,10 @@ fn renamed(message: &str) -> String {
 impl FingerError {
     /// What a parser's error says of the file at `origin`.
     pub(super) fn parse(origin: &Origin, error: &toml::de::Error) -> Self {
-        let said = error.message();
-        let cure = cure(said).replace("docs/reference/scenes.md", "docs/guides/fingers.md");
-        match origin.blamed(error.span(), said) {
-            Some((field, place)) => {
-                let colon = if field.is_empty() { "" } else { ": " };
-                let message = format!("{field}{colon}{said}{cure}");
+        match parsed(origin, error, "docs/guides/fingers.md") {
+            (message, None) => Self::Incomplete { path: origin.path().into(), message },
+            (message, Some(place)) => {
                 Self::Located(Box::new(Located { place, error: Self::Parse { message } }))
-            }
-            None => {
-                Self::Incomplete { path: origin.path().into(), message: format!("{said}{cure}") }
             }
         }
     }
