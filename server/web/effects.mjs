@@ -8,7 +8,9 @@ const WINDOW = 40;
 /** So many answers under new terms are compared with as many under the old ones. */
 const ENOUGH = 12;
 const REFRESH_MS = 300;
-const PARTS = [['wait', 'waited for a thread'], ['solve', 'contact'], ['infer', 'network'], ['rest', 'effects, coding']];
+const PARTS = [['wait', 'waited for a thread'], ['solve', 'contact'], ['infer', 'network'], ['rest', '']];
+/** What is left of a frame's time: the service does not tell effects and its own checks apart. */
+const REST = { bare: 'checks and sending', more: 'effects, checks and sending' };
 /** Where the electrodes of the example are, px. */
 const GRID = [80, 101, 122, 143];
 /** These exclude each other (docs/reference/protocol-effects.md). */
@@ -84,7 +86,10 @@ export class EffectSwitches {
       const key = document.createElement('span');
       key.className = `key ${name}`;
       const figure = document.createElement('output');
-      key.append(`${label} `, figure);
+      const words = document.createElement('span');
+      words.textContent = `${label} `;
+      if (name === 'rest') this.restWords = words;
+      key.append(words, figure);
       byId('frame-key').append(key);
       return figure;
     });
@@ -159,6 +164,8 @@ export class EffectSwitches {
 
   #bar() {
     const { recent } = this;
+    const rest = `${this.on.size === 0 ? REST.bare : REST.more} `;
+    if (this.restWords.textContent !== rest) this.restWords.textContent = rest;
     const whole = PARTS.reduce((sum, [name]) => sum + recent.of(name), 0) || 1;
     PARTS.forEach(([name], k) => {
       this.bars[k].style.width = `${(100 * recent.of(name)) / whole}%`;
@@ -176,9 +183,27 @@ export class EffectSwitches {
     if (answer.spikes) put('spikes', `${answer.spikes.count} in this answer, plotted below`);
     if (answer.summary) put('summary', `${answer.summary[0].toFixed(2)} N on ${answer.summary[1].toFixed(0)} mm²`);
     if (answer.points) put('points', `${digits(answer.points[0])} J/m³`);
-    if (answer.actuators) put('actuators', Array.from(answer.actuators, (x) => ' ▁▂▃▄▅▆▇█'[Math.round(8 * Math.min(1, x))]).join(''));
+    if (answer.actuators) this.#electrodes(answer.actuators);
     if (this.on.has('contact_window')) put('contact_window', `${(answer.bytes / 1024).toFixed(0)} KiB an answer`);
     for (const name of ['relaxation', 'shear_energy']) put(name, `peak of SED ${digits(median(this.recent.peak))} J/m³`);
+  }
+
+  /** The intensities of the electrodes, one square each, as they lie on the pad. */
+  #electrodes(intensities) {
+    const row = this.rows.get('actuators');
+    if (!row || !this.on.has('actuators')) return;
+    if (row.now.firstElementChild?.childElementCount !== intensities.length) {
+      const box = document.createElement('span');
+      box.className = 'electrodes';
+      box.setAttribute('role', 'img');
+      box.append(...Array.from(intensities, () => document.createElement('i')));
+      row.now.replaceChildren(box);
+    }
+    const most = intensities.reduce((a, b) => Math.max(a, b), 0);
+    const box = row.now.firstElementChild;
+    box.setAttribute('aria-label', `strongest electrode at ${(100 * Math.min(1, most)).toFixed(0)} %`);
+    box.title = box.ariaLabel;
+    intensities.forEach((x, k) => { box.children[k].style.opacity = String(0.08 + 0.92 * Math.min(1, x)); });
   }
 
   #changes() {

@@ -42,7 +42,7 @@ export class FingerView {
     this.forceText = document.getElementById('finger-force');
     this.yaw = 0.5;
     this.pitch = 0.35;
-    this.zoom = 1;
+    this.zoom = 1.25;
     this.view = new Float32Array(16);
     this.projection = new Float32Array(16);
     this.model = new Float32Array(16);

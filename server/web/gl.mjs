@@ -156,6 +156,6 @@ in vec3 v_normal;
 out vec4 colour;
 void main() {
   float across = 1.0 - abs(dot(normalize(v_normal), normalize(v_view)));
-  float alpha = 0.04 + 0.5 * across * across * across;
+  float alpha = 0.09 + 0.5 * across * across * across;
   colour = vec4(u_tint * alpha, alpha);
 }`;

@@ -216,7 +216,7 @@ export class HardCases {
     const { summary, cases } = await fetchJson('stability.json');
     const about = document.createElement('p');
     about.className = 'hint';
-    about.textContent = `${summary} A case converges to an answer that is checked, or a typed error says what is wrong.`;
+    about.textContent = `${summary} Converged: the solver found an equilibrium, which was then checked. Evaluated: a formula was computed and checked; nothing is solved. Refused: an error names the cause, and no answer is given.`;
     byId('hard-fe').append(about, ...cases.map(feCase));
   }
 }
@@ -232,8 +232,11 @@ function feCase({ name, about, variants }) {
   const text = document.createElement('p');
   text.textContent = about;
   const table = document.createElement('table');
+  const heads = table.createTHead().insertRow();
+  for (const word of ['variant', 'outcome', 'what was checked: found, and allowed']) heads.append(Object.assign(document.createElement('th'), { scope: 'col', textContent: word }));
+  table.createTBody();
   for (const [variant, end, more] of variants) {
-    const row = table.insertRow();
+    const row = table.tBodies[0].insertRow();
     for (const words of [variant, end, more]) row.insertCell().textContent = words;
   }
   box.append(head, text, table);

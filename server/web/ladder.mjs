@@ -124,7 +124,8 @@ export function adviseTier(listing, { tier, method, budgetMs, isContact }) {
 export async function listTiers() {
   const listing = await fetchJson('v1/tiers');
   const options = listing.tiers.map((tier) => {
-    const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
+    // As in the plot: the model alone, as measured here when the service started.
+    const ms = showTime((tier.calibrated_us?.p50 ?? tier.predicted_latency_us) / 1000);
     const error = tier.relative_l2_median > 0 ? `, ${oneDigit(100 * tier.relative_l2_median)} % off` : '';
     const option = new Option(`${nameOfTier(tier.name)} (${ms}${error})`, tier.name);
     option.title = aboutTier(tier.name);

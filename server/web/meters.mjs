@@ -57,8 +57,9 @@ export class Meters {
   /** `medians`: name and median relative L2 of each set that the tier was measured on. */
   ready(ready, medians) {
     this.tier = ready.tier;
-    const each = medians.map(([set, median]) => `${nameOfSet(set)} ${percent(median)}`);
-    put('error-context', each.length ? `median of this model: ${each.join(', ')}` : '');
+    byId('error-context').replaceChildren(...medians.flatMap(([set, median]) => [['dt', nameOfSet(set)], ['dd', percent(median)]])
+      .map(([tag, textContent]) => Object.assign(document.createElement(tag), { textContent })));
+    byId('error-usual').hidden = medians.length === 0;
   }
 
   /** One row for each shipped press. */
@@ -121,7 +122,7 @@ export class Meters {
     for (const [name, count] of Object.entries(stats.counts)) put(`count-${name}`, String(count));
     const late = stats.lateInARow >= LATE_TO_TELL;
     // An old answer must not pass for the answer to this press.
-    byId('sed').classList.toggle('stale', late || !connected);
+    byId('sed').classList.toggle('stale', late || (!connected && this.stats.counts.ok > 0));
     put('stale', connected ? `${nameOfTier(this.tier)} needs more than ${this.budgetMs} ms here: ${this.advise(this.tier, this.budgetMs)}` : 'no connection');
     const top = drawStrip(byId('strip'), stats.roundTripMs, this.budgetMs);
     const budget = `budget ${this.budgetMs} ms`;

@@ -31,6 +31,8 @@ const QUIET_MS = 1000;
 const SED_UNIT = 'J/m³';
 /** A dropped file whose size could be a finger's keeps it. */
 const PLAUSIBLE_MM = { least: 3, most: 30 };
+/** What the second answer is without, if the first has it: it is asked of the pressure, or of the pose, alone. */
+const LACKS = { shear_energy: 'without shear', relaxation: 'without creep' };
 /** What the friction of the switch is, where none was chosen. */
 const FRICTION = 0.5;
 
@@ -46,6 +48,8 @@ class Page {
     document.body.toggleAttribute('data-contact', this.contact !== null);
     if (!this.contact) for (const option of [...byId('with').options]) if (option.value.startsWith('method:')) option.remove();
     this.unsent = true;
+    /** Whether the switch of shear has set the friction. */
+    this.lentFriction = false;
     /** Other terms, other legends: the next answer is drawn even if it is the same. */
     this.repaint = true;
     /** Greatest pressure of the training of the tier that runs. */
@@ -266,7 +270,8 @@ class Page {
     const { other, difference } = this.views;
     const { pixels } = this.atlas.interface.raster;
     const isSame = equal(first, this.pair.first) && equal(second, this.pair.second);
-    put('other-ms', `${this.comparison.medianMs.toFixed(1)} ms, ${this.comparison.isMethod ? 'contact and model' : 'model alone'}`);
+    const lacks = ['shear_energy', 'relaxation'].filter((name) => this.effects.on.has(name)).map((name) => LACKS[name]);
+    put('other-ms', `${this.comparison.medianMs.toFixed(1)} ms, ${[this.comparison.isMethod ? 'contact and model' : 'model alone', ...lacks].join(', ')}`);
     if (isSame && this.pair.of === this.comparison.with) return;
     this.pair.of = this.comparison.with;
     this.pair.first.set(first);
@@ -296,12 +301,19 @@ class Page {
   /** An effect was switched. */
   #effect(name, on) {
     if (name === 'spikes') this.spikes.toggle(on);
-    if (name === 'shear_energy' && on && this.contact?.friction === 0) this.#setFriction(FRICTION);
+    if (name === 'shear_energy' && on && this.contact?.friction === 0) {
+      this.#setFriction(FRICTION);
+      this.lentFriction = true;
+    } else if (!this.effects.on.has('shear_energy') && this.lentFriction) {
+      // What came with the switch goes with it: friction is had at vertices alone, which are rougher.
+      this.#setFriction(0);
+    }
     this.spikes.toggle(this.effects.on.has('spikes'));
     this.#open();
   }
 
   #setFriction(friction) {
+    this.lentFriction = false;
     byId('friction').value = String(friction);
     byId('friction-out').textContent = friction > 0 ? friction.toFixed(2) : 'none';
     if (this.contact) this.contact.friction = friction;
@@ -548,8 +560,9 @@ function showState(state, detail) {
 /** What a network says that has not learnt such a press. */
 function showFlags(id, words) {
   const text = words.join('; ');
-  if (byId(id).textContent === text) return;
-  byId(id).textContent = text;
+  if (byId(id).dataset.said === text) return;
+  byId(id).dataset.said = text;
+  byId(id).replaceChildren(...words.map((word) => Object.assign(document.createElement('span'), { textContent: word })));
   byId(id).hidden = text === '';
 }
 

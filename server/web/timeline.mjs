@@ -7,7 +7,7 @@ const KEPT = 2048;
 const SERIES = [
   { name: 'force', unit: 'N', digits: 2, least: 0.5, id: 'now-force' },
   { name: 'energy', unit: 'J/m³', digits: 0, least: 20, id: 'now-sed' },
-  { name: 'rates', unit: 'Hz', digits: 0, least: 10, id: 'now-rate' },
+  { name: 'rates', unit: 'Hz', digits: 0, least: 10, id: 'now-rate', none: '– (switch on Firing rates)' },
 ];
 /** A recording ends by itself: ten minutes at 60 frames a second. */
 const RECORDED_MOST = 36000;
@@ -117,7 +117,7 @@ export class Timeline {
     SERIES.forEach((series, k) => this.#curve(context, series, k, nowMs, width, bottom));
   }
 
-  #curve(context, { id, unit, digits, least }, k, nowMs, width, bottom) {
+  #curve(context, { id, unit, digits, least, none = '–' }, k, nowMs, width, bottom) {
     const values = this.values[k];
     let most = least;
     for (let n = 0; n < KEPT; n++) if (nowMs - this.atMs[n] < SPAN_MS && values[n] > most) most = values[n];
@@ -141,7 +141,7 @@ export class Timeline {
       latest = value;
     }
     context.stroke();
-    const text = Number.isNaN(latest) ? '–' : `${latest.toFixed(digits)} ${unit} (top ${most.toFixed(digits)})`;
+    const text = Number.isNaN(latest) ? none : `${latest.toFixed(digits)} ${unit} (top ${most.toFixed(digits)})`;
     if (byId(id).textContent !== text) byId(id).textContent = text;
   }
 

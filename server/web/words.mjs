@@ -47,11 +47,11 @@ export const aboutMethod = (method) => METHODS[method]?.[1] ?? '';
 /** Flags of an answer, as the page says them; `mostPa` is the greatest pressure of the training. */
 export function flagsOf({ outOfRange, unfamiliar, unsettled, cutOff, coarseClock }, mostPa) {
   const words = [];
-  if (outOfRange) words.push(mostPa ? `harder than any press it learnt: it saw ${(mostPa / 1000).toFixed(0)} kPa at most` : 'beyond what it learnt');
-  if (unfamiliar) words.push('unlike any press it learnt: this may mean nothing');
-  if (unsettled) words.push('the contact did not settle: rough');
-  if (cutOff) words.push('cut off at the edge of the map');
-  if (coarseClock) words.push('the clock is coarse: rates may be off');
+  if (outOfRange) words.push(mostPa ? `harder than it learnt (${(mostPa / 1000).toFixed(0)} kPa)` : 'harder than it learnt');
+  if (unfamiliar) words.push('unlike anything it learnt');
+  if (unsettled) words.push('contact not settled: rough');
+  if (cutOff) words.push('cut off at the map’s edge');
+  if (coarseClock) words.push('coarse clock: rates may be off');
   return words;
 }
 

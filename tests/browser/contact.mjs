@@ -185,6 +185,52 @@ test('friction is of the object, and shear comes with it', async () => {
   await settled();
 });
 
+test('friction that came with the switch of shear goes with it, and the second answer says what it lacks', async () => {
+  await page.selectOption('#with', 'tier:pico');
+  await page.check('#effect-shear_energy');
+  await until(() => /, without shear$/.test(document.getElementById('other-ms').textContent));
+  assert.equal(await page.locator('#friction-out').textContent(), '0.50');
+  await page.uncheck('#effect-shear_energy');
+  assert.equal(await page.locator('#friction-out').textContent(), 'none');
+  await until(() => globalThis.papilla.session.ready?.method === 'pixels');
+  await page.selectOption('#with', '');
+  await settled();
+});
+
+test('electrodes are shown as they lie, within their card', async () => {
+  await page.check('#effect-actuators');
+  await until(() => document.querySelectorAll('.electrodes i').length === 16);
+  await until(() => [...document.querySelectorAll('.electrodes i')].some((one) => Number(one.style.opacity) > 0.1));
+  const [card, table] = await page.evaluate(() => ['.effects', '#effects-list'].map((name) => document.querySelector(name).getBoundingClientRect().right));
+  assert.ok(table <= card, `the table ends at ${table}, its card at ${card}`);
+  await page.uncheck('#effect-actuators');
+});
+
+test('every choice is read whole, and a flag leaves the contact in sight', async () => {
+  for (const width of [390, 1280, 1440]) {
+    await page.setViewportSize({ width, height: 900 });
+    const cut = await page.evaluate(() => [...document.querySelectorAll('.field select, .inline select')].filter((select) => select.checkVisibility()).flatMap((select) => {
+      const copy = Object.assign(select.cloneNode(true), { style: 'width: max-content; max-width: none' });
+      select.after(copy);
+      const [needed, has] = [copy.offsetWidth, select.offsetWidth];
+      copy.remove();
+      return needed > has ? [`${select.id}: ${needed} of ${has} px`] : [];
+    }));
+    assert.deepEqual(cut, [], `${width} px wide`);
+  }
+  await chooseRadio('shape', 'wedge');
+  await page.fill('#depth', '2');
+  await until(() => document.querySelectorAll('#flags span').length >= 2);
+  const covered = await page.evaluate(() => {
+    const [flags, map] = ['#flags', '#sed .stack'].map((name) => document.querySelector(name).getBoundingClientRect());
+    return (map.bottom - flags.top) / map.height;
+  });
+  assert.ok(covered > 0.05 && covered < 0.4, `flags cover ${covered} of the map`);
+  await page.fill('#depth', '1');
+  await chooseRadio('shape', 'plate');
+  await settled();
+});
+
 test('every hard case is refused or flagged, or answered without a fault', async () => {
   const due = { 'Not a number': 'refused', 'No rotation': 'refused', Checkerboard: 'flagged', 'Ten times the range': 'flagged', Blade: 'flagged', 'Off the edge': 'flagged', 'Metres for mm': 'flagged', 'Jump of 10 mm': 'plain' };
   for (const [name, kind] of Object.entries(due)) {
