@@ -45,7 +45,6 @@
 // Determinism is tested: the same bits, not nearly the same.
 #![cfg_attr(test, allow(clippy::float_cmp))]
 
-mod body_file;
 pub mod campaign;
 pub mod cli;
 mod contact_model;

@@ -8,6 +8,8 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 - `render`: a series of frames in one call, as arrays with units and files (`Series`)
 - `local`: a session as `Session`, computed in this process
 - `Model`: SED of a map or many, computed in this process
+- `Finger`, `Hand`: what pushes back on one finger or several, computed in this process
+- `fe`: finite elements in this process: scenes explained and solved, states with maps and fields
 - `SpikeTrains`: when the touch units of a finger fire, as files
 - `sensors`: readings of an array of taxels to pressure, SED, rates and spikes
 - `devices`, `hjif`: what controllers and gloves take, and recorded touches as HJIF files
@@ -20,7 +22,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import devices, frames, hjif, meshes, sensors
+    from . import devices, fe, frames, hjif, meshes, sensors
     from .aio import AsyncSession
     from .answer import Answer, Problem, Spikes, Summary, Touch
     from .atlas import Atlas, Contact
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
         BadFrame,
         BadInput,
         BadModels,
+        BadScene,
         Closed,
         FrameFailed,
         MissingExtra,
@@ -36,10 +39,12 @@ if TYPE_CHECKING:
         NativeMissing,
         NotCarried,
         NotRendered,
+        NotSolved,
         PapillaError,
         Refused,
         Unreachable,
     )
+    from .finger import Finger, FingerContact, Hand
     from .http import DEFAULT_URL, Indentation, indentation, post, sed
     from .inprocess import LocalSession, local
     from .model import Model
@@ -59,9 +64,13 @@ __all__ = [
     "BadFrame",
     "BadInput",
     "BadModels",
+    "BadScene",
     "Closed",
     "Contact",
+    "Finger",
+    "FingerContact",
     "FrameFailed",
+    "Hand",
     "Indentation",
     "LocalSession",
     "MissingExtra",
@@ -70,6 +79,7 @@ __all__ = [
     "NativeMissing",
     "NotCarried",
     "NotRendered",
+    "NotSolved",
     "PapillaError",
     "Problem",
     "Refused",
@@ -81,6 +91,7 @@ __all__ = [
     "Touch",
     "Unreachable",
     "devices",
+    "fe",
     "frames",
     "hjif",
     "indentation",
@@ -105,6 +116,7 @@ _NAMES = {
         "BadFrame",
         "BadInput",
         "BadModels",
+        "BadScene",
         "Closed",
         "FrameFailed",
         "MissingExtra",
@@ -112,10 +124,12 @@ _NAMES = {
         "NativeMissing",
         "NotCarried",
         "NotRendered",
+        "NotSolved",
         "PapillaError",
         "Refused",
         "Unreachable",
     ),
+    "finger": ("Finger", "FingerContact", "Hand"),
     "http": ("DEFAULT_URL", "Indentation", "indentation", "post", "sed"),
     "inprocess": ("LocalSession", "local"),
     "model": ("Model",),
@@ -126,7 +140,7 @@ _NAMES = {
     "wire": ("SIDE_PX",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
-_MODULES = (*_NAMES, "devices", "frames", "hjif", "meshes", "sensors")
+_MODULES = (*_NAMES, "devices", "fe", "frames", "hjif", "meshes", "sensors")
 
 if not TYPE_CHECKING:  # type checkers see the imports above, and refuse other names
 

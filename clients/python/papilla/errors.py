@@ -102,3 +102,30 @@ class NativeFault(PapillaError):
 
 class BadModels(PapillaError):
     """A folder of models cannot be used; the message names the file, what is wrong and what to do."""
+
+
+class BadScene(PapillaError, ValueError):
+    """A scene of finite elements cannot be. `field` is the member that is to blame, dotted, and `line` its line."""
+
+    def __init__(self, message: str, field: str | None = None, line: int | None = None) -> None:
+        super().__init__(message)
+        self.field = field
+        self.line = line
+
+
+class NotSolved(PapillaError):
+    """A scene of finite elements found no equilibrium.
+
+    `kind` is `no_equilibrium`, `too_many_steps`, `slipped`, `force_not_reached`, `inverted`, `free_part`,
+    `too_large` or `stopped`; `states` is how many states were found before. `depth_mm` is the depth that was
+    aimed at, and `reached` the part of the whole load in equilibrium, both None where there is none.
+    """
+
+    def __init__(
+        self, message: str, kind: str, depth_mm: float | None = None, reached: float | None = None, states: int = 0
+    ) -> None:
+        super().__init__(message)
+        self.kind = kind
+        self.depth_mm = depth_mm
+        self.reached = reached
+        self.states = states

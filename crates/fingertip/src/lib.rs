@@ -41,6 +41,7 @@ pub mod indenter;
 pub mod influence;
 pub mod materials;
 pub mod mesh;
+pub mod run;
 pub mod scene;
 pub mod simulation;
 pub mod tissue;

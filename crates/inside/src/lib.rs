@@ -2,7 +2,8 @@
 //! thread. The native library for C and the Python package stand on it.
 //!
 //! [`Session`] takes the protocol's hello and frames as the service does, and makes the same
-//! sections of an answer; only sockets, queues and deadlines are missing.
+//! sections of an answer; only sockets, queues and deadlines are missing. [`Contact`] is one finger
+//! that is touched, without a network.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -19,10 +20,14 @@
 //! # }
 //! ```
 
+mod bundle;
+mod contact;
 mod hello;
 mod model;
 mod session;
 
+pub use bundle::Bundle;
+pub use contact::{Contact, Solved};
 pub use hello::read_hello;
 pub use model::{LoadError, Model};
 pub use papilla_proto::Problem;

@@ -1,4 +1,4 @@
-//! A folder of models: atlas, one network, and the contact model if there is one.
+//! A folder of models: a finger and one network.
 
 use std::{
     fs, io,
@@ -6,15 +6,12 @@ use std::{
     sync::Arc,
 };
 
-use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_engine::{Card, EngineError, card::Index};
-use papilla_proto::{
-    atlas::{Atlas, AtlasError, Patch, Raster},
-    contact::ContactErrors,
-};
-use papilla_render::SkinPixels;
-use papilla_session_contact::{AssetsError, contact_errors};
+use papilla_proto::atlas::{AtlasError, Patch, Raster};
+use papilla_session_contact::AssetsError;
 use papilla_session_effects as effects;
+
+use crate::Bundle;
 
 /// Why a folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -77,22 +74,14 @@ pub enum LoadError {
 
 /// A model that sessions share.
 pub struct Model {
-    /// Which point of the finger each pixel is.
-    pub atlas: Atlas,
-    /// The skin of the atlas as a map.
-    pub skin: Arc<Raster>,
+    /// The finger.
+    pub bundle: Arc<Bundle>,
     pub(crate) interface: Raster,
-    pub(crate) pixels: SkinPixels,
     pub(crate) shared: effects::Shared,
     /// The network.
     pub network: Arc<dyn papilla_engine::Model>,
     /// What is known of the network.
     pub card: Card,
-    /// What finds pressure from poses and gaps.
-    pub contact: Option<Arc<ContactModel>>,
-    pub(crate) contact_errors: Option<ContactErrors>,
-    pub(crate) pixel_skin: Option<Arc<PixelSkin>>,
-    pub(crate) interface_skin: Option<Arc<InterfaceSkin>>,
 }
 
 impl std::fmt::Debug for Model {
@@ -101,14 +90,14 @@ impl std::fmt::Debug for Model {
     }
 }
 
-fn read(file: PathBuf) -> Result<(PathBuf, Vec<u8>), LoadError> {
+pub(crate) fn read(file: PathBuf) -> Result<(PathBuf, Vec<u8>), LoadError> {
     match fs::read(&file) {
         Ok(bytes) => Ok((file, bytes)),
         Err(source) => Err(LoadError::File { file, source }),
     }
 }
 
-fn read_text(file: PathBuf) -> Result<(PathBuf, String), LoadError> {
+pub(crate) fn read_text(file: PathBuf) -> Result<(PathBuf, String), LoadError> {
     match papilla_proto::json::read_text(&file) {
         Ok(text) => Ok((file, text)),
         Err(source) => Err(LoadError::File { file, source }),
@@ -141,34 +130,10 @@ impl Model {
         let (file, onnx) = read(folder.join(format!("{name}.onnx")))?;
         let network = papilla_engine::load(&onnx, Some(&card))
             .map_err(|source| LoadError::Engine { file, source })?;
-        let (file, json) = read_text(folder.join("atlas.json"))?;
-        let atlas = Atlas::from_json(&json)
-            .and_then(|atlas| atlas.require_hash(&network.info().atlas_hash).map(|()| atlas))
-            .map_err(|source| LoadError::Atlas { file, source })?;
-        let contact = contact.map(|file| read_contact(file, &atlas)).transpose()?;
-        let (contact, contact_errors) = contact.unzip();
-        let contact_errors = contact_errors.flatten();
-        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
-        let pixels = SkinPixels::from(&skin);
-        let shared = effects::Shared::default();
-        let skin = Arc::new(skin);
-        let pixel_skin = contact.as_ref().and_then(|m| PixelSkin::new(m, &atlas, skin.clone()));
-        let pixel_skin = pixel_skin.map(Arc::new);
-        let of_interface = |m| InterfaceSkin::new(m, &atlas, skin.clone()).map(Arc::new);
-        let interface_skin = contact.as_deref().and_then(of_interface);
-        Ok(Self {
-            atlas,
-            skin,
-            interface,
-            pixels,
-            shared,
-            network,
-            card,
-            contact,
-            contact_errors,
-            pixel_skin,
-            interface_skin,
-        })
+        let hash = &network.info().atlas_hash;
+        let bundle = Arc::new(Bundle::read(folder, contact, Some(hash))?);
+        let interface = Raster::new(&bundle.atlas, Patch::Interface);
+        Ok(Self { bundle, interface, shared: effects::Shared::default(), network, card })
     }
 
     /// Draws values at the vertices of the skin as a map.
@@ -176,25 +141,6 @@ impl Model {
     /// # Errors
     /// Another number of values than vertices, or of pixels than 224 x 224.
     pub fn rasterise(&self, values: &[f32], map: &mut [f32]) -> Result<(), AtlasError> {
-        self.skin.rasterise(values, map)
+        self.bundle.raster.rasterise(values, map)
     }
-}
-
-/// A contact model, and what methods err with it if a file beside it tells that.
-fn read_contact(
-    file: &Path,
-    atlas: &Atlas,
-) -> Result<(Arc<ContactModel>, Option<ContactErrors>), LoadError> {
-    let (file, bytes) = read(file.to_owned())?;
-    let beside = file.with_file_name("contact.json");
-    let model = ContactModel::read(&bytes)
-        .and_then(|model| model.require_atlas(atlas.hash()).map(|()| model))
-        .map_err(|source| LoadError::Contact { file, source })?;
-    let errors = if beside.exists() {
-        let (file, json) = read(beside)?;
-        contact_errors(&json, &bytes).map_err(|source| LoadError::Errors { file, source })?
-    } else {
-        None
-    };
-    Ok((Arc::new(model), errors))
 }

@@ -15,7 +15,7 @@ use papilla_proto::{
     flags,
 };
 use papilla_render::{Known, Maps, Read, Rendering};
-use papilla_session_contact::{Finger, FrameForm, Hand, Skin};
+use papilla_session_contact::{Finger, FrameForm, Hand};
 use papilla_session_effects as effects;
 use papilla_session_effects::Effects;
 
@@ -99,16 +99,9 @@ impl Session {
     pub fn open(model: &Arc<Model>, hello: &Hello) -> Result<Self, Problem> {
         hello::check_form(hello)?;
         hello::check_model(hello, model)?;
-        let Model { atlas, skin, interface, shared, contact, pixel_skin, .. } = &**model;
-        let of_hand = Skin {
-            atlas,
-            raster: skin,
-            model: contact.as_ref(),
-            pixels: pixel_skin.as_ref(),
-            interface: model.interface_skin.as_ref(),
-            errors: model.contact_errors.as_ref(),
-        };
-        let hand = Hand::of(hello, of_hand)?;
+        let Model { bundle, interface, shared, .. } = &**model;
+        let hand = Hand::of(hello, bundle.skin())?;
+        let (atlas, skin) = (&bundle.atlas, &bundle.raster);
         let finger = effects::Finger { atlas, skin, interface, shared };
         let mut effects = Vec::with_capacity(hand.fingers().len());
         for _ in hand.fingers() {
@@ -200,7 +193,7 @@ impl Session {
         let Self { model, hand, .. } = self;
         let info = model.network.info();
         let method = hand.method();
-        let errors = model.contact_errors.as_ref();
+        let errors = model.bundle.contact_errors.as_ref();
         let effects = self.effects.first();
         Ready {
             version: PROTOCOL_VERSION.into(),
@@ -226,7 +219,7 @@ impl Session {
             sections: self.sections(),
             units: effects.and_then(Effects::units).map(<[_]>::to_vec),
             state: None,
-            vertices: model.atlas.vertex_count() as u32,
+            vertices: model.bundle.atlas.vertex_count() as u32,
             fingers: hand.fingers().len() as u32,
             contact_us: None,
             finger_terms: None,
@@ -295,12 +288,12 @@ impl Session {
                     return Err(Problem::new(ErrorCode::WrongLength, message).at("count"));
                 }
                 maps.pressure_pa.copy_from_slice(pressure_pa);
-                (maps.check_of(&of_finger, *range, &model.pixels)?, 0)
+                (maps.check_of(&of_finger, *range, &model.bundle.pixels)?, 0)
             }
             Frame::Window { window, sample_type, scale, payload } => {
                 let input = Input::Window { window, sample_type, scale: unit(scale) };
                 decode(input, payload, &mut maps.pressure_pa)?;
-                (maps.check_of(&of_finger, *range, &model.pixels)?, 0)
+                (maps.check_of(&of_finger, *range, &model.bundle.pixels)?, 0)
             }
             Frame::Rows { sample_type, scale, payload } => {
                 let rows = papilla_session_contact::Frame {
@@ -314,7 +307,7 @@ impl Session {
             }
         };
         let known = Known {
-            skin: &model.pixels,
+            skin: &model.bundle.pixels,
             input_max: model.card.input_statistics_max,
             response_max_per_mpa: model.card.response_max_per_mpa,
         };

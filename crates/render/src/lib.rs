@@ -44,10 +44,6 @@ use papilla_session_contact::{Finger, Frame, Taken};
 pub use frame::{Known, Read, Rendering, lose};
 pub use skin::SkinPixels;
 
-/// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
-/// zero there in all of them.
-const RIM_SHARE: f32 = 0.01;
-
 /// Room above the greatest response of the training, as a factor: about what networks err by at worst
 /// where they know the pressure.
 const RESPONSE_HEADROOM: f32 = 1.5;
@@ -158,8 +154,7 @@ impl Maps {
         trained_max: Option<InputStatistics>,
     ) -> Judged {
         let is_zero = summary.is_zero();
-        let least_pa = RIM_SHARE * summary.peak_pa;
-        let is_cut_off = skin.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
+        let is_cut_off = skin.are_cut_off(&self.pressure_pa, summary.peak_pa);
         self.is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
         self.seen_peak_pa = if self.is_clamped { range.trained_max_pa } else { summary.peak_pa };
         let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };

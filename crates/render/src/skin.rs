@@ -2,16 +2,30 @@
 
 use papilla_proto::{MAP_SIDE_PX, PixelMask, atlas::Raster};
 
+/// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
+/// zero there in all of them.
+const RIM_SHARE: f32 = 0.01;
+
 /// The pixels that show skin, and those of them at the edge of the atlas.
 #[derive(Debug, Clone)]
 pub struct SkinPixels {
     pub(crate) mask: PixelMask,
-    pub(crate) rim: Vec<usize>,
+    rim: Vec<usize>,
 }
 
 impl From<&Raster> for SkinPixels {
     fn from(skin: &Raster) -> Self {
         Self { mask: PixelMask::from(skin.mask()), rim: rim(skin.mask()) }
+    }
+}
+
+impl SkinPixels {
+    /// Whether a map whose greatest pressure is `peak_pa` presses at the edge of the atlas, so that
+    /// what lies beyond is missing.
+    #[must_use]
+    pub fn are_cut_off(&self, pressure_pa: &[f32], peak_pa: f32) -> bool {
+        let least_pa = RIM_SHARE * peak_pa;
+        self.rim.iter().any(|&i| pressure_pa.get(i).is_some_and(|p| *p > least_pa))
     }
 }
 

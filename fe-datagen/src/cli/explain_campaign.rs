@@ -1,9 +1,10 @@
 //! `explain` of a campaign: what a task of a cluster has to ask for.
 
-use super::{BETTER, print};
+use super::print;
 use papilla_fingertip::campaign::{CampaignSpec, Candidate, Indentation, indentations};
 use papilla_fingertip::forecast::{Forecast, SedError};
 use papilla_fingertip::mesh::fingertip::Order;
+use papilla_fingertip::run::BETTER;
 use papilla_fingertip::simulation::{Simulation, body::SimulationError};
 use serde::Serialize;
 use std::path::Path;

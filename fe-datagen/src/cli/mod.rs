@@ -112,9 +112,6 @@ pub fn finished(result: anyhow::Result<ExitCode>) -> ExitCode {
     })
 }
 
-/// How a scene asks for the mesh that `papilla_fingertip::forecast::better` gives.
-const BETTER: &str = "with density = \"medium\", order = \"graded\" (the defaults)";
-
 /// Exit code of a run that finished but did not pass its own checks.
 pub const CHECKS_FAILED: u8 = 3;
 

@@ -85,7 +85,7 @@ pub(crate) unsafe extern "C" fn papilla_model_load(
         };
         let model = Model::load(folder.as_ref(), tier, contact)?;
         handle.name = CString::new(model.card.name.clone()).unwrap_or_default();
-        handle.atlas_hash = CString::new(model.atlas.hash()).unwrap_or_default();
+        handle.atlas_hash = CString::new(model.bundle.atlas.hash()).unwrap_or_default();
         handle.model = Some(Arc::new(model));
         Ok(())
     };
@@ -106,18 +106,19 @@ pub(crate) unsafe extern "C" fn papilla_model_info(
         // SAFETY: as the caller promises.
         let info = unsafe { handle::room("info", info) }?;
         let model = handle.loaded()?;
-        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| model.atlas.patch(p));
+        let [skin, interface] =
+            [Patch::Skin, Patch::Interface].map(|p| model.bundle.atlas.patch(p));
         let network = model.network.info();
         info.write(PapillaModelInfo {
             name: handle.name.as_ptr(),
             atlas_hash: handle.atlas_hash.as_ptr(),
             pressure_max_pa: network.pressure_max_pa,
             sed_max_j_per_m3: network.sed_max_j_per_m3,
-            mm_per_px: model.atlas.mm_per_px(),
-            has_contact: u32::from(model.contact.is_some()),
-            vertex_count: model.atlas.vertex_count() as u32,
-            triangle_count: model.atlas.triangles().len() as u32,
-            triangles: model.atlas.triangles().as_flattened().as_ptr(),
+            mm_per_px: model.bundle.atlas.mm_per_px(),
+            has_contact: u32::from(model.bundle.contact.is_some()),
+            vertex_count: model.bundle.atlas.vertex_count() as u32,
+            triangle_count: model.bundle.atlas.triangles().len() as u32,
+            triangles: model.bundle.atlas.triangles().as_flattened().as_ptr(),
             skin_mm: skin.positions_mm.as_flattened().as_ptr(),
             skin_uv_px: skin.uv_px.as_flattened().as_ptr(),
             interface_mm: interface.positions_mm.as_flattened().as_ptr(),

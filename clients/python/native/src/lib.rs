@@ -5,7 +5,9 @@
 //! wherever something is computed, and a panic ends in `papilla.NativeFault`.
 
 mod border;
+mod finger;
 mod models;
+mod scene;
 mod session;
 
 use pyo3::prelude::*;
@@ -15,7 +17,12 @@ use pyo3::prelude::*;
 #[pyo3(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<finger::Contact>()?;
+    module.add_class::<finger::Finger>()?;
     module.add_class::<models::Models>()?;
+    module.add_class::<scene::Run>()?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<scene::State>()?;
     module.add_class::<session::Session>()?;
     Ok(())
 }

@@ -56,7 +56,7 @@ impl Models {
     /// Hash of the atlas.
     #[getter]
     fn atlas_hash(&self) -> &str {
-        self.model.atlas.hash()
+        self.model.bundle.atlas.hash()
     }
 
     /// Greatest pressure that the network was trained on, Pa.
@@ -68,7 +68,7 @@ impl Models {
     /// Whether pressure can be found from poses and gaps.
     #[getter]
     fn has_contact(&self) -> bool {
-        self.model.contact.is_some()
+        self.model.bundle.contact.is_some()
     }
 
     /// The network's card, as JSON.

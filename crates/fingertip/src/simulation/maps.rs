@@ -83,6 +83,35 @@ impl FingerMaps {
         Ok(Shard::of(&samples.iter().collect::<Vec<_>>(), self.atlas.vertex_count())?)
     }
 
+    /// The maps of states, one state after the other, each 224 x 224: by name pressure (Pa), SED on
+    /// both sides (J/m3) and, with friction, shear, which has three maps a state.
+    ///
+    /// # Errors
+    /// [`MapError::Dataset`].
+    pub fn drawn(
+        &self,
+        records: &[IncrementRecord],
+    ) -> Result<Vec<(&'static str, Vec<f32>)>, MapError> {
+        let shard = self.shard(records)?;
+        let maps = self.maps.of(&shard);
+        let draw = |fields: &[Field]| -> Result<Vec<f32>, MapError> {
+            let mut pixels = vec![0.0; records.len() * fields.len() * MAP_LEN];
+            for (i, map) in pixels.chunks_exact_mut(MAP_LEN).enumerate() {
+                maps.draw(fields[i % fields.len()], i / fields.len(), map)?;
+            }
+            Ok(pixels)
+        };
+        let mut drawn = vec![
+            ("pressure_pa", draw(&[Field::Pressure])?),
+            ("sed_dermis_j_per_m3", draw(&[Field::SedDermis])?),
+            ("sed_epidermis_j_per_m3", draw(&[Field::SedEpidermis])?),
+        ];
+        if shard.shear_pa.is_some() {
+            drawn.push(("shear_pa", draw(&[0, 1, 2].map(Field::Shear))?));
+        }
+        Ok(drawn)
+    }
+
     /// Pressure (Pa) and SED on the dermis side (J/m3) of a record, at the pixels of their patches.
     ///
     /// # Errors

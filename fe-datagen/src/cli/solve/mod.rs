@@ -4,19 +4,17 @@ mod maps;
 mod press;
 
 use super::signals::{self, INTERRUPTED};
-use super::{BETTER, CHECKS_FAILED, print};
-use papilla_dataset::Checks;
+use super::{CHECKS_FAILED, print};
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options};
 use papilla_fingertip::forecast::{SedError, better};
+use papilla_fingertip::run::{BETTER, Increment};
 use papilla_fingertip::scene::{Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
-use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::maps::FingerMaps;
-use papilla_fingertip::simulation::sample;
 use papilla_output::atomic;
-use press::{LAST_STATE, Pressed, press};
+use press::{LAST_STATE, press};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -45,36 +43,6 @@ pub(super) struct Args {
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// One stored equilibrium in `summary.json`.
-#[derive(Serialize)]
-struct Increment {
-    depth_mm: f64,
-    force_n: [f64; 3],
-    pressure_pa_max: f64,
-    /// Absent for a body without an interface between epidermis and dermis.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sed_dermis_j_per_m3_max: Option<f64>,
-    /// The same of the epidermis side.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sed_epidermis_j_per_m3_max: Option<f64>,
-    stored_energy_mj: f64,
-    /// Share of the volume beyond the calibrated stretches of its law.
-    outside_calibration: f64,
-    /// Where on the skin contact was found.
-    contact: ContactRule,
-    checks: Checks,
-    /// Block of the mesh and element in it where J is smallest.
-    j_min_at: [usize; 2],
-    /// The tangent's condition number is at least this; absent if only an indefinite one was
-    /// factorized.
-    condition_at_least: Option<f64>,
-    effort: Effort,
-    seconds: f64,
-    /// Why this state would not enter a dataset; absent if it would.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fault: Option<String>,
 }
 
 /// What `solve` says of a scene.
@@ -131,7 +99,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         effort: pressed.iter().fold(Effort::default(), |sum, p| sum.plus(&p.report.effort)),
         sed_error: SedError::of(&scene.geometry),
         stopped: matches!(solved, Err(SimulationError::Halted)),
-        increments: pressed.iter().map(|p| increment(p, maps.as_ref())).collect(),
+        increments: pressed.iter().map(|p| Increment::of(p, maps.as_ref())).collect(),
         scene,
     };
     atomic::write_json(&args.out.join("summary.json"), &summary)?;
@@ -156,31 +124,6 @@ fn stopped(summary: &Summary, states: usize, args: &Args) -> anyhow::Result<Exit
     let out = args.out.display();
     eprintln!("stopped: {kept} of {states} states are done and written to {out}");
     Ok(ExitCode::from(INTERRUPTED))
-}
-
-fn increment(pressed: &Pressed, maps: Option<&FingerMaps>) -> Increment {
-    let Pressed { record, report, pressure_mpa_max } = pressed;
-    let own = || sample::fault(record, record.pressure_mpa.len());
-    let max = |v: &[f64]| {
-        let largest = PA_PER_MPA * v.iter().copied().fold(0.0, f64::max);
-        (!v.is_empty()).then_some(largest)
-    };
-    Increment {
-        depth_mm: record.depth_mm,
-        force_n: record.force_n,
-        pressure_pa_max: PA_PER_MPA * pressure_mpa_max,
-        sed_dermis_j_per_m3_max: max(&record.sed_dermis_mpa),
-        sed_epidermis_j_per_m3_max: max(&record.sed_epidermis_mpa),
-        stored_energy_mj: report.stored_mj,
-        outside_calibration: record.outside_calibration,
-        contact: record.contact,
-        checks: record.checks,
-        j_min_at: report.j_min_at,
-        condition_at_least: Some(report.condition_at_least).filter(|c| c.is_finite()),
-        effort: report.effort,
-        seconds: record.seconds,
-        fault: maps.map_or_else(own, |maps| maps.fault(record)),
-    }
 }
 
 fn human(s: &Summary, out: &Path) -> String {

@@ -1,0 +1,171 @@
+"""Finite elements in process: the states of `fe-datagen`, to the bit; errors with fields; Ctrl-C."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import papilla
+from papilla import fe
+
+BLOCK = {
+    "geometry": {"kind": "block", "size_mm": [6.0, 6.0], "elements": [4, 4],
+                 "layers": [{"tissue": "dermis", "thickness_mm": 2.0, "elements": 2}]},
+    "indenter": {"shape": "sphere", "radius_mm": 4.0},
+    "motion": {"depth_mm": 0.3, "increments": 2},
+}  # fmt: skip
+FINGER = """
+effects = ["finite_strain", "layers"]
+[geometry]
+kind = "fingertip"
+density = "coarse"
+order = "linear"
+[indenter]
+shape = "sphere"
+radius_mm = 5.0
+[motion]
+depth_mm = 0.8
+increments = 2
+"""
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory):
+    """Solves a scene by the command line; gives the folder of its results."""
+    program = Path(os.environ.get("BIN", "target/debug")) / "fe-datagen"
+
+    def solve(text):
+        folder = tmp_path_factory.mktemp("fe")
+        (folder / "scene.toml").write_text(text)
+        out = folder / "out"
+        command = [program, "solve", folder / "scene.toml", "--out", out, "--json"]
+        subprocess.run(command, check=True, capture_output=True)
+        return out
+
+    return solve
+
+
+def test_states_of_a_finger_are_those_of_the_command_to_the_bit(command, tmp_path):
+    out = command(FINGER)
+    told = []
+    states = fe.Scene(FINGER).run(progress=lambda *words: told.append(words))
+    assert len(states) == 2 and told[0][:2] == (0, 2) and told[-1][:2] == (2, 2)
+    with np.load(out / "maps.npz") as maps:
+        for name in ("pressure_pa", "sed_dermis_j_per_m3", "sed_epidermis_j_per_m3"):
+            for state in states:
+                assert state.maps[name].tobytes() == maps[name][state.number].tobytes(), name
+    increments = json.loads((out / "summary.json").read_text())["increments"]
+    for state, increment in zip(states, increments, strict=True):
+        for timed in (state.summary, increment):
+            timed["effort"] = {name: n for name, n in timed["effort"].items() if not name.endswith("_s")}
+            timed.pop("seconds")
+        assert state.summary == increment
+        state.write_vtu(tmp_path / "state.vtu")
+        written = (out / f"state-{state.number:03}.vtu").read_bytes()
+        assert (tmp_path / "state.vtu").read_bytes() == written and b'"stress_pa"' in written
+    assert states[1].force_n[2] > states[0].force_n[2] > 0 and states[1].iterations > 0
+    assert states[1].sed_j_per_m3.max() > 0 and states[1].pressure_pa.shape == (224, 224)
+
+
+def test_fields_hang_together(tmp_path):
+    state = fe.Scene(BLOCK).run()[-1]
+    nodes, cells = state.nodes, state.cells
+    assert len(cells["sed_j_per_m3"]) == 32 and len(nodes["displacement_mm"]) == len(nodes["places_mm"])
+    assert cells["offsets"][-1] == len(cells["connectivity"]) and (cells["layer"] == 1).all()
+    # Pressure and stress of the surface say the same where the ball presses: sigma_zz = -p, to what a coarse
+    # mesh extrapolates.
+    pressed = np.argmax(nodes["pressure_pa"])
+    assert nodes["stress_pa"][pressed, 2] == pytest.approx(-nodes["pressure_pa"][pressed], rel=0.5)
+    # Compressed along z, spread along x and y.
+    under = np.argmax(cells["sed_j_per_m3"])
+    xx, yy, zz = cells["strain"][under, :3]
+    assert zz < 0 < min(xx, yy)
+    assert state.maps == {} and state.flags == ()
+    with pytest.raises(papilla.BadInput, match="no atlas"):
+        _ = state.sed_j_per_m3
+    light = next(fe.Scene(BLOCK).solve(fields=False))
+    assert light.nodes == {} and light.cells == {}
+    with pytest.raises(papilla.BadInput, match="fields=True"):
+        light.write_vtu(tmp_path / "none.vtu")
+
+
+def test_a_scene_is_a_dict_a_text_or_a_file(tmp_path):
+    text = '[geometry]\nkind = "block"\nsize_mm = [6.0, 6.0]\nelements = [4, 4]\n'
+    text += 'layers = [{ tissue = "dermis", thickness_mm = 2.0, elements = 2 }]\n'
+    text += '[indenter]\nshape = "sphere"\nradius_mm = 4.0\n[motion]\ndepth_mm = 0.3\nincrements = 2\n'
+    (tmp_path / "scene.toml").write_text(text)
+    numbers = BLOCK | {"motion": {"depth_mm": np.float64(0.3), "increments": np.int64(2)}}
+    dicts = [fe.Scene(source).as_dict() for source in (BLOCK, numbers, text, tmp_path / "scene.toml")]
+    assert all(each == dicts[0] for each in dicts) and dicts[0]["motion"]["depth_mm"] == 0.3
+
+
+def test_explain_is_that_of_the_command(tmp_path):
+    (tmp_path / "scene.toml").write_text(FINGER)
+    program = Path(os.environ.get("BIN", "target/debug")) / "fe-datagen"
+    told = subprocess.run([program, "explain", tmp_path / "scene.toml", "--json"], check=True, capture_output=True)
+    explained, command = fe.Scene(tmp_path / "scene.toml").explain(), json.loads(told.stdout)
+    for each in (explained, command):
+        each.pop("setup_s"), each.pop("better_mesh")
+        # The machine's speed is measured.
+        each["forecast"].pop("seconds"), each["forecast"].pop("machine")
+    assert dict(explained) == command and "simulated" in explained.text == str(explained)
+
+
+def test_effects_say_what_they_cost_and_change():
+    (finite,) = fe.Scene(BLOCK | {"effects": ["finite_strain"]}).effects(solve=True)
+    assert finite.name == "finite_strain" and finite.force_change > 0.01 and finite.sed_change is None
+    assert finite.seconds_with > 0 and finite.seconds_without > 0 and finite.why_not is None
+    shallow = FINGER.replace("0.8", "0.3").replace("increments = 2", "increments = 1")
+    (layers,) = fe.Scene(shallow.replace('"finite_strain", ', "")).effects(solve=True)
+    assert layers.sed_change > 0.05
+
+
+def test_a_scene_that_cannot_be_says_where():
+    with pytest.raises(papilla.BadScene, match="radius_mm") as bad:
+        fe.Scene(FINGER.replace("radius_mm = 5.0", "radius_mm = -5.0"))
+    assert bad.value.field == "indenter.radius_mm" and bad.value.line == 9
+    with pytest.raises(papilla.BadScene, match="depth"):
+        fe.Scene(BLOCK | {"motion": {"depth": 1.0}})
+    with pytest.raises(papilla.BadScene, match="cannot read"):
+        fe.Scene("nowhere.toml")
+    # Found when the body is set up.
+    far = FINGER.replace("depth_mm = 0.8", "depth_mm = 0.8\noffset_mm = [40.0, 40.0]")
+    with pytest.raises(papilla.BadScene) as bad:
+        next(fe.Scene(far).solve())
+    assert bad.value.field == "motion.offset_mm"
+
+
+def test_a_hard_case_is_an_error_with_fields():
+    # No depth of a block of 2 mm bears 900 N.
+    with pytest.raises(papilla.NotSolved, match="no equilibrium") as failed:
+        fe.Scene(BLOCK | {"motion": {"force_n": 900.0, "increments": 1}}).run(fields=False)
+    error = failed.value
+    assert error.kind == "no_equilibrium" and error.states == 0
+    assert error.depth_mm > 2.0 and 0.0 < error.reached < 1.0
+
+
+def test_ctrl_c_and_close_end_a_solve():
+    program = f"""
+import time
+from papilla import fe
+scene = fe.Scene({FINGER.replace('"linear"', '"quadratic"')!r})
+print("ready", flush=True)
+try:
+    scene.run()
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert running.stdout.readline() == "ready\n"
+    time.sleep(3.0)
+    running.send_signal(signal.SIGINT)
+    assert running.communicate(timeout=120)[0] == "interrupted\n"
+    with fe.Scene(BLOCK).solve() as solve:
+        first = next(solve)
+    assert first.number == 0 and list(solve) == []
