@@ -88,7 +88,10 @@ export class EffectSwitches {
       const figure = document.createElement('output');
       const words = document.createElement('span');
       words.textContent = `${label} `;
-      if (name === 'rest') this.restWords = words;
+      if (name === 'rest') {
+        this.restWords = words;
+        words.textContent = `${REST.bare} `;
+      }
       key.append(words, figure);
       byId('frame-key').append(key);
       return figure;

@@ -256,7 +256,8 @@ export class LadderView {
     if (!Number.isNaN(this.budgetMs)) {
       const x = this.x(this.budgetMs);
       make(svg, 'line', { class: 'budget', x1: x, x2: x, y1: MARGIN.top, y2: bottom });
-      make(svg, 'text', { class: 'tick', x: x + 4, y: MARGIN.top + 8 }, 'budget');
+      const isRight = x + 4 + 6 * FONT_PX > width;
+      make(svg, 'text', { class: 'tick', x: isRight ? x - 4 : x + 4, y: MARGIN.top + 8, 'text-anchor': isRight ? 'end' : 'start' }, 'budget');
     }
   }
 

@@ -7,6 +7,7 @@ import { PressControl } from './control.mjs';
 import { rms } from './colour.mjs';
 import { EffectSwitches } from './effects.mjs';
 import { FingerView } from './finger.mjs';
+import { HandView } from './fingers.mjs';
 import { HardCases } from './hard.mjs';
 import { LadderView, adviseTier, listTiers } from './ladder.mjs';
 import { MapView } from './map.mjs';
@@ -70,6 +71,16 @@ class Page {
     this.comparison = new Comparison((first, second, answer) => this.#showPair(first, second, answer), (message) => notify(message));
     this.hard = new HardCases(atlas, this.contact !== null, () => this.mostPa, () => this.answered.tier || null);
     this.session = this.#makeSession();
+    this.hand = this.contact && new HandView(atlas, this.press, {
+      terms: () => ({ ...this.#terms(), effects: [], ...(byId('method').value && { method: byId('method').value }) }),
+      told: (ready) => this.#handReady(ready),
+      notify: (message) => notify(message),
+      answered: (forceN, sedPeak, serverMs) => {
+        if (nowOf() - noticedAtMs > NOTICE_MS) notify('');
+        this.timeline.add(nowOf(), forceN, sedPeak, NaN, null, serverMs);
+        this.ladder.showLive(serverMs, NaN);
+      },
+    });
     this.#listen();
     this.#restore();
     this.tick = (nowMs) => this.#frame(nowMs);
@@ -119,7 +130,13 @@ class Page {
   }
 
   start() {
-    this.#open();
+    const isHand = stateOf(location.hash).mode === 'hand' && this.hand !== null;
+    if (isHand) {
+      document.querySelector('input[name=mode][value=hand]').checked = true;
+      this.#setMode('hand');
+    } else {
+      this.#open();
+    }
     this.#chooseOther();
     requestAnimationFrame(this.tick);
   }
@@ -127,7 +144,8 @@ class Page {
   #open() {
     const budgetUs = Number(byId('budget').value);
     this.meters.restart(budgetUs / 1000);
-    this.#hello(performance.now());
+    if (this.mode === 'hand') this.hand.reopen();
+    else this.#hello(performance.now());
   }
 
   #hello(nowMs) {
@@ -155,7 +173,21 @@ class Page {
     return adviseTier(this.listing, { tier, method: this.session.ready?.method ?? null, budgetMs, isContact: this.solves });
   }
 
+  /** The session of the hand has terms: model and budget are those of all its fingers. */
+  #handReady(ready) {
+    if (this.mode !== 'hand') return;
+    document.body.dataset.live = '';
+    this.mostPa = ready.pressure_max_pa;
+    this.answered.tier = ready.tier;
+    this.ladder.setReady(ready);
+    this.#noteBudget(ready);
+    showState('ready', '');
+    notify('');
+    this.hard.begin();
+  }
+
   #ready(ready) {
+    if (this.mode === 'hand') return;
     this.mostPa = ready.pressure_max_pa;
     this.repaint = true;
     this.ladder.setReady(ready);
@@ -323,6 +355,11 @@ class Page {
   /** One display frame: newest press, its map, and the map on its way if no answer is due. */
   #frame(nowMs) {
     requestAnimationFrame(this.tick);
+    if (this.mode === 'hand') {
+      this.hand.step(nowMs, Number(byId('depth').value), this.stream.checked);
+      this.timeline.draw(nowMs);
+      return;
+    }
     if (this.solves && this.session.ready && this.contact.isDue(nowMs)) {
       this.#hello(nowMs);
       if (this.comparison.isMethod) this.#chooseOther();
@@ -479,7 +516,7 @@ class Page {
 
   /** What a link holds. */
   get state() {
-    return { ...this.control.state, tier: byId('tier').value, budget: byId('budget').value, method: byId('method').value, with: byId('with').value || 'none', friction: byId('friction').value, effects: [...this.effects.on].join(' ') };
+    return { mode: this.mode === 'hand' ? 'hand' : '', ...this.control.state, tier: byId('tier').value, budget: byId('budget').value, method: byId('method').value, with: byId('with').value || 'none', friction: byId('friction').value, effects: [...this.effects.on].join(' ') };
   }
 
   /** Takes what the link says. */
@@ -501,6 +538,9 @@ class Page {
   #setMode(mode) {
     this.mode = mode;
     document.body.dataset.mode = mode;
+    this.hand?.toggle(mode === 'hand');
+    // What an effect brings is of one finger.
+    byId('effects-list').inert = mode === 'hand';
     this.control.changed = true;
     this.replay.changed = true;
     this.replay.judged = false;
@@ -510,7 +550,7 @@ class Page {
     this.effects.forget();
     this.repaint = true;
     this.pair.of = '';
-    if (this.contact) this.#open();
+    if (this.contact && mode !== 'hand') this.#open();
     this.#chooseOther();
     if (mode === 'replay') {
       this.views.pressure.setMarker(null);
@@ -540,6 +580,8 @@ class Page {
     byId('replay-play').textContent = on ? 'Pause' : 'Play';
   }
 }
+
+const nowOf = () => performance.now();
 
 /** A press that does not move is answered alike again and again: no reason to draw it again. */
 function equal(a, b) {

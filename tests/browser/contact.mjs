@@ -304,6 +304,48 @@ test('a link holds what is pressed and how it is computed', async () => {
   await other.close();
 });
 
+test('a hand: five fingertips of one session, each pressed and lifted by itself', async () => {
+  await chooseRadio('mode', 'hand');
+  await chooseRadio('shape', 'sphere');
+  await page.fill('#size', '4');
+  await page.fill('#depth', '1.5');
+  const rounds = (more) => page.evaluate((n) => globalThis.papilla.hand.count + n, more).then((wanted) => until((count) => globalThis.papilla.hand.count >= count, wanted));
+  const digits = () => page.evaluate(() => Object.fromEntries(globalThis.papilla.hand.digits.map(({ id, forceN, depthMm, press, view }) => [id, { forceN, depthMm, uvPx: Array.from(press.uvPx), sed: Array.from(view.values) }])));
+  const down = (share, name) => until(([id, depth]) => globalThis.papilla.hand.digits.find((digit) => digit.id === id).depthMm === depth, [name, share * 1.5]);
+  const { hand: fingers } = await until(() => globalThis.papilla.hand.hand?.ready && { hand: globalThis.papilla.hand.hand.ready.fingers }).then((handle) => handle.jsonValue());
+  assert.equal(fingers, 5);
+  await down(1, 'index');
+  await rounds(3);
+  const all = await digits();
+  assert.deepEqual(Object.keys(all), ['little', 'ring', 'middle', 'index', 'thumb']);
+  assert.ok(all.little.forceN > 0.01 && all.little.forceN < all.ring.forceN && all.ring.forceN < all.index.forceN, JSON.stringify(Object.values(all).map((digit) => digit.forceN)));
+  assert.match(await page.locator('#hand-time').textContent(), /^five answers in [\d.]+ ms, there and back; each [\d.]+ ms in the server; \d\.\d\d N in all/);
+  await page.uncheck('.digit[data-digit=ring] input');
+  await down(0, 'ring');
+  const pad = page.locator('.digit[data-digit=index] .pad');
+  await pad.scrollIntoViewIfNeeded();
+  const box = await pad.boundingBox();
+
+  await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.7 * box.height);
+  await page.mouse.down();
+  await page.mouse.up();
+  await rounds(3);
+  const moved = await digits();
+  assert.deepEqual([moved.ring.forceN, largest(moved.ring.sed)], [0, 0]);
+  assert.ok(placeOfPeak(moved.index.sed).row > placeOfPeak(all.index.sed).row + 20, 'the index is pressed nearer to its base');
+  assert.deepEqual([placeOfPeak(moved.thumb.sed), moved.thumb.uvPx], [placeOfPeak(all.thumb.sed), all.thumb.uvPx], 'the thumb stays');
+  await chooseRadio('shape', 'plate');
+  await until(() => globalThis.papilla.hand.hand?.ready && globalThis.papilla.hand.body === globalThis.papilla.press.body);
+  await rounds(3);
+  assert.ok((await digits()).thumb.forceN > 1.3 * all.thumb.forceN, 'all fingers meet the other shape');
+  const link = await page.evaluate(() => new URLSearchParams(globalThis.papilla.state).get('mode'));
+  assert.equal(link, 'hand');
+  await chooseRadio('mode', 'press');
+  assert.equal(await page.evaluate(() => globalThis.papilla.hand.hand), null);
+  await settled();
+  assert.ok((await felt()).forceN > 0);
+});
+
 test('it fits a phone', async () => {
   await page.emulateMedia({ colorScheme: 'dark' });
   await page.setViewportSize({ width: 390, height: 844 });
@@ -312,6 +354,12 @@ test('it fits a phone', async () => {
   const wide = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
   assert.ok(wide <= 0, `the page is ${wide} px wider than the screen`);
   assert.ok(await page.locator('#finger-force').isVisible());
+  await chooseRadio('mode', 'hand');
+  await until(() => globalThis.papilla.hand.hand?.ready);
+  const beyond = await page.evaluate(() => [document.documentElement.scrollWidth - window.innerWidth, ...[...document.querySelectorAll('.digit')].map((digit) => digit.getBoundingClientRect().right - window.innerWidth)]);
+  assert.ok(beyond.every((px) => px <= 0), `beyond the screen: ${beyond} px`);
+  await keep('hand-dark-phone');
+  await chooseRadio('mode', 'press');
 });
 
 test('nothing was complained about', () => {
