@@ -78,8 +78,6 @@ impl Chosen {
 fn obstacle_to_pixels(hello: &Hello, input: Input, skin: Skin<'_>) -> Option<&'static str> {
     if input == Input::Gaps {
         Some("gaps say nothing of what lies between their places")
-    } else if announced::has_friction(hello) {
-        Some("friction and 'shear' are found at vertices alone")
     } else if skin.model.is_some() && skin.pixels.is_none() {
         Some("this service's contact model names no layers of the skin")
     } else {

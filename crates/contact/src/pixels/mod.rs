@@ -35,6 +35,7 @@ mod mirror;
 mod nearby;
 mod own_dents;
 mod rounds;
+mod rubbing;
 mod skin;
 mod smooth;
 mod spacing;
@@ -48,11 +49,11 @@ use crate::error::ContactError;
 use crate::force_target::{NetForce, Search};
 use crate::model::ContactModel;
 use crate::object::Object;
-use crate::objects::View;
 use crate::second_order::Amplitudes;
 use crate::solver::Solver;
 use convolution::Convolution;
 use papilla_atlas::MAP_LEN;
+use rubbing::Rubbing;
 use std::sync::Arc;
 use turns::Turns;
 use window::Window;
@@ -83,6 +84,7 @@ pub struct PixelContact {
     convolution: Convolution,
     amplitudes: Option<Amplitudes>,
     turns: Turns,
+    rubbing: Rubbing,
     /// By pixel of the window: gap, mm, and pressure, MPa.
     rest: Vec<f32>,
     pressure: Vec<f32>,
@@ -95,9 +97,10 @@ pub struct PixelContact {
 }
 
 impl Solver {
-    /// Finds what presses on the finger, first at vertices, then on pixels; pressure at vertices is
-    /// the pixels' mean under their hats, the local stiffness the vertices' own. Gaps at vertices say
-    /// nothing of what lies between them, so it is objects that are needed.
+    /// Finds what presses on the finger, first at vertices, then on pixels; pressure and traction at vertices
+    /// are the pixels' means under their hats, the local stiffness the vertices' own. Where skin
+    /// sticks and where it slips is found at vertices. Gaps at vertices say nothing of what lies between
+    /// them, so it is objects that are needed.
     ///
     /// # Errors
     /// As [`Self::solve`].
@@ -108,7 +111,6 @@ impl Solver {
         out: &mut Contact,
     ) -> Result<(), ContactError> {
         self.within(objects.into(), 0.0, |solver, view| {
-            require_slippery(view)?;
             (solver.sides.toward, solver.sides.fine) = (None, true);
             solver.frame_until(AT_VERTICES_MM, view, out)?;
             pixels.refine(solver, solver.held(view), out)?;
@@ -130,7 +132,6 @@ impl Solver {
     ) -> Result<f64, ContactError> {
         net.validate()?;
         self.within(objects.into(), 0.0, |solver, view| {
-            require_slippery(view)?;
             (solver.sides.toward, solver.sides.fine) = (Some(net.direction), true);
             let mut effort = Effort::default();
             if solver.reached.is_none() {
@@ -151,14 +152,6 @@ impl Solver {
     }
 }
 
-/// Refuses friction.
-fn require_slippery(view: View<'_>) -> Result<(), ContactError> {
-    if view.is_rough() {
-        return Err(ContactError::Friction("pixels know no shear: solve at vertices"));
-    }
-    Ok(())
-}
-
 impl PixelContact {
     /// A finger that nothing touches.
     #[must_use]
@@ -170,6 +163,7 @@ impl PixelContact {
             convolution: Convolution::new(Arc::clone(&skin.plans)),
             amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
             turns: Turns::new(model.vertices()),
+            rubbing: Rubbing::new(model.vertices()),
             rest: vec![0.0; pixels],
             of_vertices: vec![0.0; pixels],
             pressure: vec![0.0; pixels],
@@ -204,7 +198,7 @@ impl PixelContact {
     fn answer(&mut self, solver: &Solver, out: &mut Contact) {
         let (model, person) = (&solver.model, solver.person());
         let strength = solver.strength();
-        let Self { window, pressure, held_pa, map_pa, peak_pa, skin, .. } = self;
+        let Self { window, pressure, held_pa, map_pa, peak_pa, skin, rubbing, .. } = self;
         *peak_pa = 0.0;
         let unit_pa = unit_pa(person);
         let Contact { quality, effort, stiffness_n_per_mm, .. } = *out;
@@ -216,7 +210,12 @@ impl PixelContact {
                 continue;
             }
             let size = f64::from(p * window.area_mm2[i]);
-            let force = window.normal[i].map(|n| f64::from(n) * size);
+            let mut push = window.normal[i];
+            if rubbing.is_rough() {
+                let along = rubbing.ratio(skin, window, i);
+                push.iter_mut().zip(along).for_each(|(push, along)| *push += along);
+            }
+            let force = push.map(|n| f64::from(n) * size);
             out.add(window.at_mm[i].map(f64::from), force, size, f64::from(window.area_mm2[i]));
             size_n += size;
             out.penetration_mm = out.penetration_mm.max(f64::from(p * window.give[i]));
@@ -234,6 +233,9 @@ impl PixelContact {
             let p = window.vertex_pressure(vertex);
             if p > 0.0 {
                 out.press(vertex as u32, p * unit_pa);
+                if let Some(shear_pa) = out.shear_pa.get_mut(vertex) {
+                    *shear_pa = window.vertex_traction(vertex).map(|q| q * unit_pa);
+                }
             }
         }
         out.finish(person, size_n);

@@ -27,14 +27,15 @@ impl PixelContact {
         view: View<'_>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        let Self { skin, window, pressure, map_pa, held_pa, turns, .. } = self;
+        let Self { skin, window, pressure, map_pa, held_pa, turns, rubbing, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
         if !window.open(skin, model, solver.near(), view, &mut out.effort) {
             self.reset();
             return Ok(());
         }
         let unit_pa = unit_pa(person);
-        solver.forces(turns.without_pixels());
+        solver.normal_forces(turns.without_pixels());
+        rubbing.begin(solver, &mut window.shear_n);
         let is_alone = turns.found_without_pixels().iter().flatten().all(|force| *force == 0.0);
         if is_alone && !window.is_inside_at_rest(skin, view, &mut out.effort) {
             // Skin is dented by the last frame alone.
@@ -61,7 +62,8 @@ impl PixelContact {
             return Err(ContactError::Diverged);
         };
         // Pixels go by vertices' answer no further than a start.
-        out.quality.settled = change <= UNSETTLED && !view.is_spent(&out.effort);
+        out.quality.settled =
+            change <= UNSETTLED && !view.is_spent(&out.effort) && solver.is_slip_settled();
         if change > UNSETTLED {
             self.stand_in();
             // From what came close the next frame goes on.
@@ -141,7 +143,7 @@ impl PixelContact {
             convolution.open(window.size(), window.rows(), pitch_mm, &skin.surface);
             window.number_cells(skin, [convolution.rows(), convolution.columns()]);
         }
-        let Self { skin, window, convolution, bounded, turns, .. } = self;
+        let Self { skin, window, convolution, bounded, turns, rubbing, .. } = self;
         let Self { rest, pressure, of_vertices, .. } = self;
         let size = [convolution.rows(), convolution.columns()];
         window.press_forces(skin, rest);
@@ -156,6 +158,7 @@ impl PixelContact {
             }
             effort.iterations += 1;
             window.sum_forces(skin, &pressure[..n], turns.found());
+            rubbing.sum_forces(skin, window, &pressure[..n]);
             return Ok(turns.take(&mut window.force_n));
         }
         let gradient = &mut rest[..m];
@@ -175,6 +178,7 @@ impl PixelContact {
         effort.work += (2 + u64::from(products)) * unit;
         effort.iterations += 1;
         window.sum_forces(skin, &pressure[..n], turns.found());
+        rubbing.sum_forces(skin, window, &pressure[..n]);
         Ok(turns.take(&mut window.force_n))
     }
 }

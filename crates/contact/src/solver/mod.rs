@@ -186,15 +186,34 @@ impl Solver {
         &self.model
     }
 
-    /// Forces on the skin's vertices after the last frame, N.
-    pub(crate) fn forces(&self, force_n: &mut [Vec<f32>; 3]) {
+    /// Forces of objects along their normals on the skin's vertices after the last frame, N.
+    pub(crate) fn normal_forces(&self, force_n: &mut [Vec<f32>; 3]) {
         let Slots { found, size, .. } = &self.patch.values;
-        for (force, found) in force_n.iter_mut().zip(found) {
-            force.fill(0.0);
-            for slot in (0..self.patch.near()).filter(|slot| size[*slot] > 0.0) {
-                force[self.patch.vertices()[slot] as usize] = found[slot];
+        force_n.iter_mut().for_each(|force| force.fill(0.0));
+        let friction = self.friction.as_ref().filter(|f| f.is_rough);
+        for slot in (0..self.patch.near()).filter(|slot| size[*slot] > 0.0) {
+            let shear = friction.map_or([0.0; 3], |f| f.shear_n(slot));
+            for i in 0..3 {
+                force_n[i][self.patch.vertices()[slot] as usize] = found[i][slot] - shear[i];
             }
         }
+    }
+
+    /// Calls `note` with each vertex under force, the size of its normal force and its force along the skin,
+    /// N, after a frame in which something has friction; false after any other frame.
+    pub(crate) fn each_rubbed(&self, mut note: impl FnMut(usize, f32, [f32; 3])) -> bool {
+        let Some(friction) = self.friction.as_ref().filter(|f| f.is_rough) else { return false };
+        let size = &self.patch.values.size;
+        for slot in (0..self.patch.near()).filter(|slot| size[*slot] > 0.0) {
+            note(self.patch.vertices()[slot] as usize, size[slot], friction.shear_n(slot));
+        }
+        true
+    }
+
+    /// Whether the last frame's forces along the skin are settled.
+    pub(crate) fn is_slip_settled(&self) -> bool {
+        let friction = self.friction.as_ref().filter(|f| f.is_rough);
+        friction.is_none_or(|f| f.violation_mm <= UNSETTLED_MM)
     }
 
     /// Free distances (reference mm) and vertices that things were near in the last frame.
@@ -476,8 +495,8 @@ impl Solver {
         out.quality.share = self.amplitudes.as_ref().map_or(0.0, |a| a.share);
         out.quality.out_of_range = self.overflow || is_deep || !(out.quality.share <= share_max);
         out.quality.settled = change <= UNSETTLED_MM && least >= -INSIDE_MAX_MM;
+        out.quality.settled &= self.is_slip_settled();
         let friction = self.friction.as_ref().filter(|f| f.is_rough);
-        out.quality.settled &= friction.is_none_or(|f| f.violation_mm <= UNSETTLED_MM);
         let shear_n = |slot: usize| friction.map_or([0.0; 3], |f| f.shear_n(slot));
         collect(&self.model, &self.patch, self.settings.person, shear_n, out);
         if self.settings.stiffness {

@@ -6,6 +6,7 @@ mod memory;
 mod mirror;
 mod pixels;
 mod plane;
+mod rubbing;
 mod seams;
 mod support;
 

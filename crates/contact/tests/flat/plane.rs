@@ -15,6 +15,8 @@ pub(crate) const PITCH_MM: f64 = 0.05;
 /// E / (1 - nu^2), MPa.
 pub(crate) const MODULUS_MPA: f64 = 0.2;
 const POISSON: f64 = 0.48;
+/// E* = 4 G of what is incompressible.
+pub(crate) const SHEAR_MODULUS_MPA: f64 = MODULUS_MPA / 4.0;
 /// Where the skin's last row of vertices stands, and the map ends: x, mm.
 pub(crate) const END_MM: f64 = (SIDE - 1) as f64 / 2.0 * SPACING_PX * PITCH_MM;
 
@@ -91,6 +93,32 @@ pub(crate) fn half_plane(spacing: PixelSpacing) -> Plane {
     })
 }
 
+/// A half-space that a force along it moves along itself as Cerruti says,
+/// `u_i = (1 / r + x_i x_k / r^3) q_k / 4 pi G`, and at a vertex itself the mean over a disc of its area.
+/// Normal and tangential forces do not mix, as in what is incompressible.
+pub(crate) fn rough_plane() -> Plane {
+    let unit = 1.0 / (4.0 * PI * SHEAR_MODULUS_MPA);
+    let area_mm2 = (SPACING_PX * PITCH_MM).powi(2);
+    let own = unit * 1.5 * 16.0 / (3.0 * PI * (area_mm2 / PI).sqrt());
+    with_compliance(PixelSpacing::One, |arrays| {
+        let place = arrays.positions_mm.as_chunks::<3>().0.to_vec();
+        let mut values = arrays.compliance_mm_per_n.iter_mut();
+        for i in 0..3 * place.len() {
+            for k in i..3 * place.len() {
+                let value = values.next().expect("an upper triangle");
+                let ((p, a), (q, b)) = ((i / 3, i % 3), (k / 3, k % 3));
+                if a == 2 || b == 2 {
+                    continue;
+                }
+                let d: [f64; 2] = std::array::from_fn(|x| f64::from(place[p][x] - place[q][x]));
+                let (r, same) = (d[0].hypot(d[1]), f64::from(u8::from(a == b)));
+                let away = || unit * (same / r + d[a] * d[b] / r.powi(3));
+                *value = if p == q { own * same } else { away() } as f32;
+            }
+        }
+    })
+}
+
 fn with_compliance(spacing: PixelSpacing, change: impl Fn(&mut Arrays)) -> Plane {
     let margin = (MAP_SIDE_PX as f64 - SPACING_PX * (SIDE - 1) as f64) / 2.0;
     let uv = |i: usize| [i % SIDE, i / SIDE].map(|k| margin + SPACING_PX * k as f64);
@@ -128,7 +156,7 @@ fn with_compliance(spacing: PixelSpacing, change: impl Fn(&mut Arrays)) -> Plane
     let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
     let skin = PixelSkin::new(&model, &atlas, Arc::clone(&raster)).expect("layers");
     let skin = Arc::new(skin);
-    let settings = Settings { method: Method::SmallStrain, ..Settings::default() };
+    let settings = Settings { method: Method::SmallStrain, friction: true, ..Settings::default() };
     Plane {
         pixels: PixelContact::new(skin, &model, spacing),
         out: Contact::new(model.vertices()),

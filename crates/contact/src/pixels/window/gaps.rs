@@ -41,7 +41,7 @@ impl Window {
             if view.is_spent(effort) {
                 // What is known presses there.
                 (self.give[slot], self.gap_mm[slot]) = (0.0, 0.0);
-                self.normal[slot] = inward;
+                (self.normal[slot], self.friction[slot]) = (inward, 0.0);
                 continue;
             }
             let stencil = &skin.stencils[self.entries[slot] as usize];
@@ -73,6 +73,7 @@ impl Window {
             self.give[slot] =
                 (person.stiffness / (nearest.stiffness_mpa_per_mm * person.width)) as f32;
             self.gap_mm[slot] = gap;
+            self.friction[slot] = nearest.friction as f32;
             self.normal[slot] = nearest.normal.map(|n| n as f32);
         }
         Ok(())

@@ -85,6 +85,12 @@ impl Window {
         }
     }
 
+    /// Mean traction along the skin under a vertex' hat, MPa.
+    pub(in super::super) fn vertex_traction(&self, vertex: usize) -> [f32; 3] {
+        let area = self.hat_mm2[vertex];
+        [0, 1, 2].map(|i| if area > 0.0 { self.shear_n[i][vertex] / area } else { 0.0 })
+    }
+
     /// Mean pressure under a vertex' hat, MPa.
     pub(in super::super) fn vertex_pressure(&self, vertex: usize) -> f32 {
         if self.hat_mm2[vertex] > 0.0 { self.hat_n[vertex] / self.hat_mm2[vertex] } else { 0.0 }

@@ -37,6 +37,8 @@ pub(super) struct Window {
     gap_mm: Vec<f32>,
     /// How far the object gives way, mm/MPa.
     pub give: Vec<f32>,
+    /// Coefficient of friction of the object.
+    pub friction: Vec<f32>,
     /// Of the pixels that are solved for: gap for a pressure beside the vertices', mm/MPa.
     pub ease: Vec<f32>,
     /// Slot of each pixel of the map.
@@ -56,10 +58,12 @@ pub(super) struct Window {
     linear: [Vec<f32>; 3],
     moved: [Vec<f32>; 3],
     /// By vertex of the skin: deformed place, mm, beside which a fourth number keeps it together;
-    /// displacement by its own hats, mm; force, N; hat's area, mm2; pressure, MPa; force, N.
+    /// displacement by its own hats, mm; normal force, N; hat's area, mm2; pressure, MPa; force, N.
     vertices: Vec<[f32; 4]>,
     dent_mm: Vec<f32>,
     pub force_n: [Vec<f32>; 3],
+    /// By vertex of the skin: force along it, N; 0 where nothing has friction.
+    pub shear_n: [Vec<f32>; 3],
     hat_mm2: Vec<f32>,
     hat_mpa: Vec<f32>,
     hat_n: Vec<f32>,
@@ -97,6 +101,7 @@ impl Window {
             inward: vec![[0.0; 3]; pixels],
             gap_mm: vec![0.0; pixels],
             give: vec![0.0; pixels],
+            friction: vec![0.0; pixels],
             ease: vec![0.0; pixels],
             slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
             first: [0; 2],
@@ -112,6 +117,7 @@ impl Window {
             vertices: vec![[0.0; 4]; vertices],
             dent_mm: zeros(),
             force_n: vector(),
+            shear_n: vector(),
             hat_mm2: zeros(),
             hat_mpa: zeros(),
             hat_n: zeros(),

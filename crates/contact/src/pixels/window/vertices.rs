@@ -56,7 +56,7 @@ impl Window {
         }
         self.touched.clear();
         for vertex in 0..model.vertices() {
-            let force = [0, 1, 2].map(|i| self.force_n[i][vertex]);
+            let force = [0, 1, 2].map(|i| self.force_n[i][vertex] + self.shear_n[i][vertex]);
             if force.iter().all(|f| *f == 0.0) {
                 continue;
             }
