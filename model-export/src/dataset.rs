@@ -24,6 +24,12 @@ struct Campaign {
     indenter: Option<IndenterSpec>,
     #[serde(default)]
     indenters: Vec<NamedIndenter>,
+    friction: Option<Friction>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Friction {
+    coefficient: f64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -99,6 +105,12 @@ impl Dataset {
         let Campaign { indenter, indenters, .. } = &self.campaign;
         let named = indenters.iter().find(|other| other.name == indentation.indenter);
         named.map(|named| &named.indenter).or(indenter.as_ref())
+    }
+
+    /// Coulomb's coefficient of friction between skin and indenters; none without friction.
+    #[must_use]
+    pub fn friction(&self) -> Option<f64> {
+        self.campaign.friction.as_ref().map(|friction| friction.coefficient)
     }
 
     /// Effects that the solver modelled.

@@ -69,7 +69,7 @@ pub fn measure(
 }
 
 /// Traction along the skin at the vertices, Pa; none if the shard holds none.
-fn traction(
+pub(crate) fn traction(
     dataset: &Dataset,
     indentation: &IndentationEntry,
     shard: &Shard,

@@ -161,6 +161,7 @@ impl Hand {
             let finger = Finger::new(hello, its_form, skin, solved, objects.clone(), *person);
             fingers.push(Arc::new(Mutex::new(finger.map_err(of_finger)?)));
         }
+        warnings.extend(announced::traction_without_sed(hello, skin_of(0)));
         Ok(Self { form, methods, fingers, sections, warnings })
     }
 

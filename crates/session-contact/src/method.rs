@@ -27,7 +27,7 @@ impl Chosen {
         if input == Input::Pressure {
             return Ok(None);
         }
-        let obstacle = obstacle_to_pixels(hello, input, skin);
+        let obstacle = obstacle_to_pixels(input, skin);
         match (hello.method, obstacle) {
             (Some(method), Some(obstacle)) if method.is_on_pixels() => {
                 let message = format!(
@@ -75,7 +75,7 @@ impl Chosen {
 }
 
 /// Why pixels cannot serve a hello; none if they can.
-fn obstacle_to_pixels(hello: &Hello, input: Input, skin: Skin<'_>) -> Option<&'static str> {
+fn obstacle_to_pixels(input: Input, skin: Skin<'_>) -> Option<&'static str> {
     if input == Input::Gaps {
         Some("gaps say nothing of what lies between their places")
     } else if skin.model.is_some() && skin.pixels.is_none() {

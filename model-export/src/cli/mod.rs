@@ -4,6 +4,7 @@ mod check;
 mod contact;
 mod contact_maps;
 mod evaluate;
+mod friction;
 mod here;
 mod index;
 mod ladder;
@@ -110,6 +111,12 @@ enum Command {
     /// each against the FE states of the datasets, with the processor time of a frame.
     #[command(after_long_help = EXIT_CODES)]
     Contact(contact::Options),
+    /// Measure friction: from an indenter's way to force, traction along the skin and SED.
+    ///
+    /// Contact at vertices, on coarse pixels and on pixels, each along the ways of simulations with friction,
+    /// in steps of .05 mm at most, against their FE states.
+    #[command(after_long_help = EXIT_CODES)]
+    Friction(friction::Options),
     /// Write the pressure that contact on pixels makes of a dataset's indentations.
     ///
     /// A network that learns them beside FE's pressure (`papilla_trainer train --contact`) answers
@@ -136,6 +143,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Ladder(options) => ladder::run(options, json),
         Command::Here(options) => here::run(options, json),
         Command::Contact(options) => contact::run(options, json),
+        Command::Friction(options) => friction::run(options, json),
         Command::ContactMaps(options) => contact_maps::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }

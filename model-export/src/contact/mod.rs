@@ -1,9 +1,11 @@
 //! The contact ladder: from where things are to pressure, force and SED, against FE, and what that
 //! takes.
 
+mod friction;
 mod maps;
 mod placed;
 
+pub use self::friction::{RUBBING, Rubbed, measure as measure_friction};
 pub use self::maps::ContactMaps;
 use self::placed::Placed;
 use crate::dataset::Dataset;

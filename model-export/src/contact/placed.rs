@@ -45,6 +45,11 @@ impl Placed {
         Ok(touch.map(|(first_touch, direction)| Self { shape, first_touch, direction }))
     }
 
+    /// Its way in, a unit vector.
+    pub(super) fn direction(&self) -> [f64; 3] {
+        self.direction
+    }
+
     /// It at a depth from there, slid along its own x and y.
     pub(super) fn at(&self, depth_mm: f64, slide_mm: [f64; 2]) -> Object {
         let mut placement = self.first_touch;

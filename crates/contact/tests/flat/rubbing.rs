@@ -145,7 +145,7 @@ fn what_sticks_is_held() {
     let first = hold(solver, pixels, 6);
     solver.reset();
     pixels.reset();
-    let last = hold(solver, pixels, 300);
+    let last = hold(solver, pixels, 120);
     assert!(first[0] > 0.05 * first[2], "{first:?}");
     assert!((last[0] / first[0] - 1.0).abs() < 5e-3, "{last:?} from {first:?}");
 }
@@ -157,7 +157,7 @@ fn any_move_is_answered() {
     let mut random = fastrand::Rng::with_seed(31);
     let mut places = [[0.0, 0.0, 0.2], [2.0, 1.0, 0.1]];
     let (mut touching, mut unsettled, mut pulled) = (0, 0, 0);
-    for step in 0..250 {
+    for step in 0..120 {
         for place in &mut places {
             let far = if random.u8(..12) == 0 { 1.0 } else { 0.05 };
             for (i, value) in place.iter_mut().enumerate() {
@@ -181,5 +181,5 @@ fn any_move_is_answered() {
         pulled += usize::from(out.shear_pa.iter().flatten().any(|q| *q != 0.0));
     }
     println!("{touching} touch, {pulled} pulled, {unsettled} unsettled");
-    assert!(pulled > 150 && unsettled < touching / 10, "{touching} {pulled} {unsettled}");
+    assert!(pulled > 70 && unsettled < touching / 10, "{touching} {pulled} {unsettled}");
 }

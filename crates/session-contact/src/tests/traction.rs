@@ -9,7 +9,10 @@ use super::*;
 fn gaps_that_say_how_things_move_pull_as_the_object_does() {
     let plane = Plane::new();
     let ball = AnnouncedObject { friction: Some(0.5), ..ball(20.0) };
-    let by_object = plane.hand(&Hello { objects: Some(vec![ball]), ..objects() }).expect("a hand");
+    // Gaps are found at vertices.
+    let method = Some(ContactMethod::SecondOrder);
+    let by_object = Hello { objects: Some(vec![ball]), method, ..objects() };
+    let by_object = plane.hand(&by_object).expect("a hand");
     let hello = Hello {
         input: Some(Input::Gaps),
         input_layout: Some(SampleLayout::Vertices),
@@ -65,6 +68,8 @@ fn traction_is_felt_where_the_hello_names_it() {
     let ball = AnnouncedObject { friction: Some(0.5), ..ball(20.0) };
     let rough = Hello {
         objects: Some(vec![ball]),
+        // What the client sends is known at vertices alone.
+        method: Some(ContactMethod::SecondOrder),
         pressure: Some(SampleLayout::Vertices),
         shear: Some(true),
         effects: vec!["shear_energy".to_owned()],
@@ -124,6 +129,31 @@ fn traction_is_felt_where_the_hello_names_it() {
     let mut finger = by_client.fingers()[0].lock().expect("no panic");
     let refused = finger.take(frame(&endless, 0), None).expect_err("refused");
     assert_eq!(refused.field.as_deref(), Some("traction_pa[0]"));
+}
+
+/// A hello whose SED leaves the traction out is asked whether it means that.
+#[test]
+fn who_has_friction_is_asked_about_shear_energy() {
+    let plane = Plane::new();
+    let rough = |friction: f64| {
+        let ball = AnnouncedObject { friction: Some(friction), ..ball(20.0) };
+        Hello { objects: Some(vec![ball]), ..objects() }
+    };
+    let with = |name: &str| Hello { effects: vec![name.to_owned()], ..rough(0.5) };
+    for (hello, is_asked) in [
+        (rough(0.5), true),
+        (rough(0.0), false),
+        (Hello { map: Some(false), ..rough(0.5) }, false),
+        (with("summary"), true),
+        (with("shear_energy"), false),
+        (with("relaxation"), false),
+    ] {
+        let hand = plane.hand(&hello).expect("a hand");
+        assert_eq!(hand.method(), Some(ContactMethod::Pixels));
+        let asked: Vec<_> = hand.warnings().iter().map(|warning| &warning.member).collect();
+        assert_eq!(asked == ["effects"], is_asked, "{hello:?}: {asked:?}");
+        assert!(hand.warnings().iter().all(|w| w.question.contains("'shear_energy'")));
+    }
 }
 
 #[test]
