@@ -18,7 +18,7 @@ use tracing_subscriber::{
     util::SubscriberInitExt,
 };
 
-use crate::config::{Config, SettingError};
+use crate::config::{Config, LogFormat, SettingError};
 
 /// Target of the spans: what goes to the collector, and not into the log.
 const SPANS: &str = "papilla_spans";
@@ -44,8 +44,12 @@ impl Telemetry {
             .with_ansi(io::stderr().is_terminal())
             .with_writer(io::stderr)
             // It would be told to stderr as well, and that panics where nobody reads it.
-            .log_internal_errors(false)
-            .with_filter(filter);
+            .log_internal_errors(false);
+        let log = match config.log_format {
+            LogFormat::Text => log.boxed(),
+            LogFormat::Json => log.json().flatten_event(true).boxed(),
+        };
+        let log = log.with_filter(filter);
         let registry = tracing_subscriber::registry().with(log);
         let taken = |error: tracing_subscriber::util::TryInitError| refuse(error.to_string());
         #[cfg(feature = "otlp")]

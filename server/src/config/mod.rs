@@ -12,12 +12,23 @@ use std::{
     path::PathBuf,
 };
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use papilla_engine::Choice;
 use serde::Serialize;
 
 pub use error::{ConfigError, SettingError};
 pub(crate) use rules::Timeouts;
+
+/// How a line of the log is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON object a line: `timestamp`, `level`, `target`, `message`, and the members of the event.
+    Json,
+}
 
 const HELP_TAIL: &str = "\
 Every setting has three names: --max-sessions on the command line, PAPILLA_MAX_SESSIONS in the
@@ -133,6 +144,11 @@ pub struct Config {
     /// Log filter, as `info` or `papilla_server=debug`.
     #[arg(long, env = "PAPILLA_LOG", default_value = "info", value_name = "FILTER")]
     pub log: String,
+
+    /// How a line of the log is written: text, or json, one object a line, for programs that collect
+    /// logs.
+    #[arg(long, env = "PAPILLA_LOG_FORMAT", default_value = "text", value_name = "FORMAT")]
+    pub log_format: LogFormat,
 
     /// Print the start line, or the report of `check`, as JSON.
     #[arg(long, env = "PAPILLA_JSON")]
@@ -252,6 +268,7 @@ impl Default for Config {
             backend: Choice::Auto,
             calibration_ms: 1500,
             log: "info".to_owned(),
+            log_format: LogFormat::Text,
             json: false,
             otlp_endpoint: None,
             tokens: None,

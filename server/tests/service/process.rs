@@ -373,3 +373,21 @@ fn a_log_that_no_terminal_shows_has_no_colours() {
     assert!(log.contains("INFO"), "{log}");
     assert!(!log.contains('\u{1b}'), "{log:?}");
 }
+
+/// Each line of a log for programs is an object, whose members name the event, its time and its level.
+#[test]
+fn a_log_for_programs_is_an_object_a_line() {
+    let folder = model_folder();
+    let logged = Logged::start(folder.path(), &["--log", "info", "--log-format", "json"]);
+    let log = logged.log();
+    let lines: Vec<Value> =
+        log.lines().map(|line| serde_json::from_str(line).expect("an object")).collect();
+    assert!(lines.len() > 1, "{log}");
+    for line in &lines {
+        for member in ["timestamp", "level", "target", "message"] {
+            assert!(line[member].is_string(), "{member}: {line}");
+        }
+        assert!(line["timestamp"].as_str().is_some_and(|time| time.ends_with('Z')), "{line}");
+    }
+    assert!(lines.iter().any(|line| line["level"] == "INFO"), "{log}");
+}

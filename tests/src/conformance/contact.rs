@@ -133,8 +133,7 @@ impl ContactRecorder {
                 let hello: Hello = member(step, "hello")?;
                 // What the script asks of ready stays; how pressure is found is written.
                 if hello.input.is_some_and(|input| input != Input::Pressure) {
-                    let has_friction = hello.has_traction() || hello.shear == Some(true);
-                    let method = method(&hello, has_friction);
+                    let method = method(&hello);
                     step["expect"]["ready"]["method"] = json!(method);
                 }
                 *hand = Some(self.hand(hello)?);
@@ -170,7 +169,7 @@ impl ContactRecorder {
         let has_friction = hello.shear == Some(true)
             || hello.friction.is_some()
             || hello.objects.iter().flatten().any(|o| o.friction.is_some());
-        let method = method(&hello, has_friction);
+        let method = method(&hello);
         let spacing = match method {
             ContactMethod::Pixels => Some(PixelSpacing::One),
             ContactMethod::CoarsePixels => Some(PixelSpacing::Two),
@@ -285,12 +284,10 @@ impl ContactRecorder {
 
 /// The method that a session of this hello has: the one that it names, or else pixels where they can
 /// serve it.
-fn method(hello: &Hello, has_friction: bool) -> ContactMethod {
-    let is_for_pixels = hello.input == Some(Input::Objects) && !has_friction;
-    hello.method.unwrap_or(if is_for_pixels {
-        ContactMethod::Pixels
-    } else {
-        ContactMethod::SecondOrder
+fn method(hello: &Hello) -> ContactMethod {
+    hello.method.unwrap_or(match hello.input {
+        Some(Input::Objects) => ContactMethod::Pixels,
+        _ => ContactMethod::SecondOrder,
     })
 }
 
