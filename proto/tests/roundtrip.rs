@@ -161,6 +161,7 @@ fn contact() -> impl Strategy<Value = Hello> {
             force_target: asked.0,
             stiffness: asked.1,
             shear: asked.2,
+            displacement: asked.2.map(|on| !on),
             ..Hello::default()
         })
 }

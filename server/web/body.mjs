@@ -6,6 +6,8 @@
 const TIP_MM = 11.25;
 const HALF_MM = { across: 8.72, thick: 6.53 };
 const RINGS = 14;
+/** The rest of the finger follows the patch's edge over so far. */
+const FOLLOWS_MM = 3;
 const END = { lengthMm: 12, steps: 4, narrows: 0.12 };
 /** Height of the nail's free edge, as a share of the finger's greatest. */
 const FREE_EDGE = 0.64;
@@ -83,6 +85,23 @@ export function bodyMesh(atlas) {
   }
   closeBase(out, border, isBase, baseMm);
   return Float32Array.from(out);
+}
+
+/** The vertex of the patch's border nearest to each vertex of a mesh (6 floats each), and how much of its motion that follows. */
+export function followingOf(atlas, mesh) {
+  const p = atlas.skin.positionsMm;
+  const border = borderOf(atlas.triangles);
+  const vertex = new Uint32Array(mesh.length / 6);
+  const weight = new Float32Array(mesh.length / 6);
+  for (let n = 0; n < vertex.length; n++) {
+    let nearest = Infinity;
+    for (const at of border) {
+      const d2 = (mesh[6 * n] - p[3 * at]) ** 2 + (mesh[6 * n + 1] - p[3 * at + 1]) ** 2 + (mesh[6 * n + 2] - p[3 * at + 2]) ** 2;
+      if (d2 < nearest) [nearest, vertex[n]] = [d2, at];
+    }
+    weight[n] = Math.exp(-nearest / FOLLOWS_MM ** 2);
+  }
+  return { vertex, weight };
 }
 
 /** Goes on from the base for a little, ever narrower, and ends in a cap. */

@@ -44,6 +44,8 @@ export class Contact {
     this.friction = 0;
     /** The contact method asked for; '' leaves it to the server. */
     this.method = '';
+    /** Whether the finger is drawn, and so how far its skin moves is asked for. */
+    this.draws = false;
     this.announcedAtMs = -Infinity;
     this.announced = null;
   }
@@ -52,7 +54,8 @@ export class Contact {
   hello(nowMs) {
     this.announced = this.press.body;
     this.announcedAtMs = nowMs;
-    return this.terms(this.method);
+    // Springs move no skin beside them: without its displacement the finger is drawn flattened.
+    return { ...this.terms(this.method), ...(this.draws && this.method !== 'springs' && { displacement: true }) };
   }
 
   /** The same for a session that finds the pressure by another method. */

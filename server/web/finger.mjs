@@ -1,10 +1,11 @@
-// The 3-D finger: the atlas's skin patch, painted with the SED beneath it and flattened where the
-// indenter stands, on a closed body with a nail; turned by dragging. Drawn only when something changed.
+// The 3-D finger: the atlas's skin patch, painted with the SED beneath it and moved as the service found
+// (without a contact model: flattened where the indenter stands), on a closed body with a nail; turned by
+// dragging. Drawn only when something changed.
 
 import { MAP_LEN, SIDE_PX } from './protocol.mjs';
 import { TABLES, TABLE_LEN } from './colour.mjs';
 import { computeNormals } from './atlas.mjs';
-import { bodyMesh, nailMesh } from './body.mjs';
+import { bodyMesh, followingOf, nailMesh } from './body.mjs';
 import { fringeOf } from './mask.mjs';
 import { arrowMesh, indenterMesh } from './indenter.mjs';
 import { onTheme } from './theme.mjs';
@@ -37,6 +38,8 @@ export class FingerView {
     this.decades = 0;
     this.floor = 0;
     this.press = null;
+    /** Whether the skin is where the service found it. */
+    this.isMoved = false;
     /** What pushes back; null: nothing is drawn. */
     this.force = null;
     this.forceText = document.getElementById('finger-force');
@@ -50,6 +53,9 @@ export class FingerView {
     this.direction = new Float32Array(3);
     this.fringe = fringeOf(atlas.interface.raster.mask);
     this.dirty = true;
+    this.bodyRest = bodyMesh(atlas);
+    this.bodyNow = Float32Array.from(this.bodyRest);
+    this.following = followingOf(atlas, this.bodyRest);
     this.#measure();
     this.#build();
     canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
@@ -72,26 +78,61 @@ export class FingerView {
     this.dirty = true;
   }
 
-  /** Flattens the skin against the indenter of `press` and shows it; null takes it away. */
+  /** Shows the indenter of `press`; null takes it away, and the skin goes back to rest. Skin that no service moves is flattened against it. */
   setPress(press) {
-    const { positions, atlas, gl } = this;
+    const { positions, atlas } = this;
     const rest = atlas.skin.positionsMm;
     this.press = press;
+    this.dirty = true;
+    if (press) this.#updateIndenter(press);
+    if (press && this.isMoved) return;
+    this.isMoved = false;
     positions.set(rest);
-    if (press) {
-      for (let i = 0; i < press.overlapMm.length; i++) {
-        const w = press.overlapMm[i];
-        if (w <= 0) continue;
-        for (let k = 0; k < 3; k++) positions[3 * i + k] = rest[3 * i + k] - w * press.normal[k];
-      }
-      this.#updateIndenter(press);
+    for (let i = 0; press && i < press.overlapMm.length; i++) {
+      const w = press.overlapMm[i];
+      if (w <= 0) continue;
+      for (let k = 0; k < 3; k++) positions[3 * i + k] = rest[3 * i + k] - w * press.normal[k];
     }
+    this.#moveSkin();
+  }
+
+  /** Moves the skin by what the service found, x y z a vertex, mm; null: it does not tell. Returns how far the farthest vertex moves. */
+  setDisplacement(movedMm) {
+    this.isMoved = movedMm !== null;
+    if (!movedMm) return NaN;
+    const { positions, atlas } = this;
+    const rest = atlas.skin.positionsMm;
+    let most = 0;
+    for (let i = 0; i < positions.length; i += 3) {
+      for (let k = 0; k < 3; k++) positions[i + k] = rest[i + k] + movedMm[i + k];
+      most = Math.max(most, Math.hypot(movedMm[i], movedMm[i + 1], movedMm[i + 2]));
+    }
+    this.#moveSkin();
+    return most;
+  }
+
+  #moveSkin() {
+    const { positions, atlas, gl } = this;
     computeNormals(atlas.triangles, positions, this.normals);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.position);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, positions);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.normal);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.normals);
+    this.#moveBody();
     this.dirty = true;
+  }
+
+  /** The closed rest of the finger follows the patch's edge, so that no seam opens there. */
+  #moveBody() {
+    const { gl, body, positions, bodyRest, bodyNow, following } = this;
+    const rest = this.atlas.skin.positionsMm;
+    for (let n = 0; n < following.vertex.length; n++) {
+      const [at, weight] = [3 * following.vertex[n], following.weight[n]];
+      for (let k = 0; k < 3; k++) bodyNow[6 * n + k] = bodyRest[6 * n + k] + weight * (positions[at + k] - rest[at + k]);
+    }
+    if (!body) return;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.body);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, bodyNow);
   }
 
   /** Draws what pushes back (a touch of contact.mjs) as an arrow with its number; null takes it away. */
@@ -330,11 +371,11 @@ export class FingerView {
     attribute(1, 3, 24, 12);
     this.glassBody = null;
     this.glassCount = 0;
-    for (const [name, mesh] of [['body', bodyMesh(atlas)], ['nail', nailMesh()]]) {
+    for (const [name, mesh] of [['body', this.bodyNow], ['nail', nailMesh()]]) {
       this[`${name}Count`] = mesh.length / 6;
       this[`${name}Array`] = gl.createVertexArray();
       gl.bindVertexArray(this[`${name}Array`]);
-      buffer(name, mesh, gl.STATIC_DRAW);
+      buffer(name, mesh, name === 'body' ? gl.DYNAMIC_DRAW : gl.STATIC_DRAW);
       attribute(0, 3, 24);
       attribute(1, 3, 24, 12);
     }

@@ -20,6 +20,7 @@ import { Replay, fetchJson } from './replay.mjs';
 import { LOG_DECADES, Scale } from './scale.mjs';
 import { hashOf, npyOf, pictureOf, pythonOf, save, stateOf } from './share.mjs';
 import { SpikeView } from './spikes.mjs';
+import { SureBar } from './sure.mjs';
 import { themeButton } from './theme.mjs';
 import { Timeline } from './timeline.mjs';
 import { flagsOf, nameOfMethod, nameOfTier } from './words.mjs';
@@ -60,13 +61,17 @@ class Page {
     this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN), pose: new Float32Array(7), pressed: null };
     this.answered = { sequence: 0, tier: '', pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
     this.pair = { of: '', first: new Float32Array(MAP_LEN), second: new Float32Array(MAP_LEN), difference: new Float32Array(MAP_LEN), apart: NaN };
+    /** How far each vertex of the skin has moved, as it is drawn. */
+    this.movedMm = new Float32Array(3 * atlas.vertexCount);
     this.meters = new Meters((tier, budgetMs) => this.#advice(tier, budgetMs).text);
     this.replay = new Replay(atlas);
     this.spikes = new SpikeView();
+    this.sure = { sed: new SureBar(byId('sed-sure')), other: new SureBar(byId('other-sure')) };
     this.timeline = new Timeline();
     this.#makeViews();
     this.control = new PressControl(atlas, this.press, this.views.pressure);
     if (this.finger) this.control.attachFinger(this.finger);
+    if (this.contact) this.contact.draws = this.finger !== null;
     this.effects = new EffectSwitches(effects, (name, on) => this.#effect(name, on));
     this.comparison = new Comparison((first, second, answer) => this.#showPair(first, second, answer), (message) => notify(message));
     this.hard = new HardCases(atlas, this.contact !== null, () => this.mostPa, () => this.answered.tier || null);
@@ -234,8 +239,12 @@ class Page {
     this.#followTier(answer.tierNumber);
     showFlags('flags', flagsOf(answer, this.mostPa));
     const touch = answer.touch ? readTouch(answer.touch) : null;
+    if (this.mode === 'press') this.sure.sed.show(answer.errorEstimate);
     if (touch) this.meters.press(touch);
-    if (this.mode === 'press') this.finger?.setForce(touch);
+    if (this.mode === 'press') {
+      this.finger?.setForce(touch);
+      this.#moveSkin(answer.displacementMm);
+    }
     if (answer.spikes) this.spikes.show(answer.spikes, answer.timeMs, this.press.uvPx);
     this.answered.sequence = answer.sequence;
     this.answered.tier = this.session.ready?.tier;
@@ -251,8 +260,18 @@ class Page {
     const forceN = touch?.forceN ?? (this.sent.mode === 'press' ? this.press.forceN : NaN);
     const rateHz = answer.ratesHz ? answer.ratesHz.reduce((a, b) => Math.max(a, b), 0) : NaN;
     this.timeline.add(nowMs, forceN, this.views.sed.peak, rateHz, this.sent.pressed, answer.serverUs / 1000);
-    if (this.sent.mode === 'replay' && this.mode === 'replay' && this.replay.sent >= 0) this.#showErrors(nowMs);
+    if (this.sent.mode === 'replay' && this.mode === 'replay' && this.replay.sent >= 0) this.#showErrors(nowMs, answer.errorEstimate);
     else if (this.sent.mode === 'press' && this.mode === 'press') this.comparison.offer(this.answered.pressurePa, this.answered.sedJPerM3, this.sent.pose, nowMs);
+  }
+
+  /** Draws the skin as the service moved it; a press that stands still is not drawn again. */
+  #moveSkin(movedMm) {
+    if (!this.finger || (movedMm && this.finger.isMoved && equal(movedMm, this.movedMm))) return;
+    if (movedMm) this.movedMm.set(movedMm);
+    const was = this.finger.isMoved;
+    const most = this.finger.setDisplacement(movedMm);
+    if (was && !movedMm) this.finger.setPress(this.press);
+    put('moved', Number.isNaN(most) ? '–' : `${most.toFixed(2)} mm`);
   }
 
   /** The budget may go on with another tier while the session lasts. */
@@ -286,12 +305,14 @@ class Page {
     this.finger?.setSed(this.answered.sedJPerM3, sed.max, sed.logarithmic ? LOG_DECADES : 0, sed.floor);
   }
 
-  #showErrors(nowMs) {
+  #showErrors(nowMs, estimate) {
     const { other, difference } = this.views;
     this.meters.errors(this.replay.judge(this.answered.sedJPerM3), this.replay.errors, this.replay.sent);
     other.show(this.replay.truth, nowMs);
     difference.show(this.replay.difference, nowMs);
     byId('other-ms').textContent = 'solved once, before';
+    this.sure.sed.show(estimate, this.replay.figures.relativeL2);
+    this.sure.other.show(null);
     showFlags('other-flags', []);
     byId('apart').textContent = `${(100 * this.replay.figures.relativeL2).toFixed(1)} % apart (relative L2)`;
   }
@@ -301,6 +322,7 @@ class Page {
     if (this.mode !== 'press') return;
     const { other, difference } = this.views;
     const { pixels } = this.atlas.interface.raster;
+    this.sure.other.show(answer.errorEstimate);
     const isSame = equal(first, this.pair.first) && equal(second, this.pair.second);
     const lacks = ['shear_energy', 'relaxation'].filter((name) => this.effects.on.has(name)).map((name) => LACKS[name]);
     put('other-ms', `${this.comparison.medianMs.toFixed(1)} ms, ${[this.comparison.isMethod ? 'contact and model' : 'model alone', ...lacks].join(', ')}`);

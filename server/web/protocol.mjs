@@ -59,12 +59,12 @@ export class RequestFrame {
 export function emptyAnswer() {
   return {
     status: 'error', sequence: 0, serverUs: 0, queueUs: 0, networkUs: 0, solveUs: 0, bytes: 0, timeMs: 0, tierNumber: 0,
-    sedJPerM3: null, pressurePa: null, touch: null, spikes: null, ratesHz: null, summary: null, points: null, actuators: null,
+    sedJPerM3: null, pressurePa: null, displacementMm: null, errorEstimate: null, touch: null, spikes: null, ratesHz: null, summary: null, points: null, actuators: null,
     outOfRange: false, noContact: false, unfamiliar: false, unsettled: false, cutOff: false, coarseClock: false,
   };
 }
 
-const CARRIED = ['sedJPerM3', 'pressurePa', 'touch', 'spikes', 'ratesHz', 'summary', 'points', 'actuators'];
+const CARRIED = ['sedJPerM3', 'pressurePa', 'displacementMm', 'errorEstimate', 'touch', 'spikes', 'ratesHz', 'summary', 'points', 'actuators'];
 
 /** Reads an answer into `into`; `at` is where its sections are. Throws an Error that says what is wrong with the frame. */
 export function readAnswer(data, into, at = BARE_MAP) {
@@ -95,6 +95,8 @@ function readSections(data, view, into, at) {
   const floats = (section, length) => (section ? new Float32Array(data, section.offset, length ?? section.bytes / 4) : null);
   if (at.map) into.sedJPerM3 = readMap(data, view, at.map.offset);
   into.pressurePa = floats(at.pressure, MAP_LEN);
+  into.displacementMm = floats(at.displacement);
+  into.errorEstimate = floats(at.error_estimate);
   into.touch = floats(at.touch, TOUCH_LEN);
   if (into.touch) [into.solveUs] = [into.touch[15]];
   into.summary = floats(at.summary, SUMMARY_LEN);

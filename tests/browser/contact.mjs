@@ -114,6 +114,41 @@ test('the mouse moves the indenter, the wheel presses deeper, and lifting it end
   assert.ok((await felt()).forceN > 0);
 });
 
+test('the finger is drawn as the service moved it: out of the object, and round the contact too', async () => {
+  await chooseRadio('shape', 'plate');
+  await page.fill('#depth', '1.5');
+  await settled();
+  await until(() => globalThis.papilla.finger.isMoved);
+  const moved = () => page.evaluate(() => {
+    const { finger, press, atlas, movedMm } = globalThis.papilla;
+    const rest = atlas.skin.positionsMm;
+    let [most, beside, deepest, off] = [0, 0, 0, 0];
+    for (let i = 0; i < press.overlapMm.length; i++) {
+      const [u, p] = [[0, 1, 2].map((k) => finger.positions[3 * i + k] - rest[3 * i + k]), [0, 1, 2].map((k) => finger.positions[3 * i + k])];
+      const size = Math.hypot(...u);
+      off = Math.max(off, ...u.map((x, k) => Math.abs(x - movedMm[3 * i + k])));
+      most = Math.max(most, size);
+      if (press.overlapMm[i] === 0) beside = Math.max(beside, size);
+      const height = [0, 1, 2].reduce((sum, k) => sum + (p[k] - press.pointMm[k]) * press.normal[k], 0) - press.heightMm;
+      if (press.overlapMm[i] > 0) deepest = Math.max(deepest, height);
+    }
+    return { most, beside, deepest, off, said: document.getElementById('moved').textContent };
+  });
+  const pressed = await moved();
+  assert.ok(pressed.off < 1e-4, `drawn ${pressed.off} mm off what was answered`);
+  assert.ok(pressed.most > 1 && pressed.most < 2, `the farthest vertex moves ${pressed.most} mm under a plate 1.5 mm deep`);
+  assert.ok(pressed.deepest < 0.12, `skin is drawn ${pressed.deepest} mm inside the plate`);
+  assert.ok(pressed.beside > 0.1, `beside the plate skin moves ${pressed.beside} mm`);
+  assert.equal(pressed.said, `${pressed.most.toFixed(2)} mm`);
+  await page.focus('#pad');
+  await page.keyboard.press('Escape');
+  await settled();
+  await until(() => document.getElementById('moved').textContent === '0.00 mm');
+  assert.equal((await moved()).most, 0);
+  await page.keyboard.press(' ');
+  await settled();
+});
+
 test('replay sends maps as ever, and a press is solved again after it', async () => {
   await chooseRadio('mode', 'replay');
   await until(() => globalThis.papilla.session.ready && !globalThis.papilla.session.ready.method && globalThis.papilla.replay.judged);

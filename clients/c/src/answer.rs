@@ -85,7 +85,7 @@ impl Layout {
                 SectionName::Touch => &mut answer.touch,
                 SectionName::Pressure => &mut answer.pressure_pa,
                 // No hello gets this far with them.
-                SectionName::Spikes | SectionName::Shear => continue,
+                SectionName::Spikes | SectionName::Shear | SectionName::Displacement => continue,
             };
             *list = part;
         }

@@ -23,6 +23,10 @@ pub(crate) fn read(text: &str) -> Result<Hello, Problem> {
         let message = "the library answers no shear at vertices; a touch has its force";
         return Err(Problem::new(ErrorCode::BadContact, message).at("shear"));
     }
+    if hello.displacement == Some(true) {
+        let message = "the library answers no displacement at vertices";
+        return Err(Problem::new(ErrorCode::BadContact, message).at("displacement"));
+    }
     // An answer of the library is lists of f32, which spikes are not.
     if hello.effects.iter().any(|e| e.parse() == Ok(RuntimeEffect::Spikes)) {
         let message = "the library answers no spikes; 'afferents' gives firing rates";

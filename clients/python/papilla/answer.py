@@ -130,6 +130,7 @@ class Answer:
     pressure_pa: Map | None = None
     """The pressure that was found, if asked for: a map, or a value a vertex."""
     shear_pa: Map | None = None
+    displacement_mm: Map | None = None
     """The traction along the skin, if asked for: x y z a vertex, in the finger's frame."""
     vertices: Map | None = None
     """SED at the vertices, J/m3, if asked for in place of the map."""
@@ -213,6 +214,8 @@ def read(message: wire.Message, header: wire.Header, ready: dict[str, Any], tier
             answer.pressure_pa = found.reshape(wire.SIDE_PX, wire.SIDE_PX) if is_map else found
         elif name == "shear":
             answer.shear_pa = wire.floats(message, offset, size).reshape(-1, 3)
+        elif name == "displacement":
+            answer.displacement_mm = wire.floats(message, offset, size).reshape(-1, 3)
         elif name == "vertices":
             answer.vertices = wire.scaled(message, offset, ready["vertices"], header.sample_type, header.scale)
         elif name == "summary":

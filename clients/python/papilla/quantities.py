@@ -16,6 +16,7 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "sed_j_per_m3": Quantity("J m-3", "strain energy density at the dermis-epidermis interface"),
     "rates_hz": Quantity("s-1", "firing rate of SA1 afferents"),
     "pressure_pa": Quantity("Pa", "pressure on the skin that was found"),
+    "displacement_mm": Quantity("mm", "how far the skin has moved, in the finger's frame"),
     "shear_pa": Quantity("Pa", "traction along the skin, in the finger's frame"),
     "points_j_per_m3": Quantity("J m-3", "strain energy density at the points of the hello"),
     "point_rates_hz": Quantity("s-1", "firing rate of SA1 afferents at the points of the hello"),

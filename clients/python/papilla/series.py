@@ -28,8 +28,8 @@ class Series:
     """What came of a series of frames.
 
     `values` has an array for each quantity, with the frame as first axis. What there is depends on the hello:
-    `sed_j_per_m3`, `rates_hz`, `pressure_pa`, `shear_pa`, `points_j_per_m3`, `point_rates_hz`, `actuators`,
-    the members of `Touch` and `Summary` as `touch_force_n`, `summary_sa1_rate_hz` and so on, and times in
+    `sed_j_per_m3`, `rates_hz`, `pressure_pa`, `shear_pa`, `displacement_mm`, `points_j_per_m3`,
+    `point_rates_hz`, `actuators`, the members of `Touch` and `Summary` as `touch_force_n`, `summary_sa1_rate_hz` and so on, and times in
     the service. `series["sed_j_per_m3"]` is the same as `series.values["sed_j_per_m3"]`.
     """
 
@@ -102,7 +102,7 @@ class Series:
         shape = self.values[name].shape[1:]
         if shape == (SIDE_PX, SIDE_PX):
             return (first, "row", "column")
-        if name == "shear_pa":
+        if name in ("shear_pa", "displacement_mm"):
             return (first, "vertex", "axis")
         if name.startswith("touch_") and shape:
             return (first, "axis")
@@ -169,6 +169,7 @@ def _quantities(answer: Answer) -> dict[str, Any]:
         found["sed_j_per_m3"] = answer.sed
     for name, value in (
         ("rates_hz", answer.rates), ("pressure_pa", answer.pressure_pa), ("shear_pa", answer.shear_pa),
+        ("displacement_mm", answer.displacement_mm),
         ("points_j_per_m3", answer.points), ("point_rates_hz", answer.point_rates_hz), ("actuators", answer.actuators),
     ):  # fmt: skip
         if value is not None:

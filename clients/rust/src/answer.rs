@@ -73,6 +73,8 @@ pub struct Answer {
     pub pressure_pa: Vec<f32>,
     /// Traction along the skin at each vertex, Pa, in the finger's frame, if asked for.
     pub shear_pa: Vec<[f32; 3]>,
+    /// How far each vertex of the skin has moved, mm, in the finger's frame, if asked for.
+    pub displacement_mm: Vec<[f32; 3]>,
     /// SED at the vertices, J/m3, if asked for in place of the map.
     pub vertices: Vec<f32>,
     /// Firing rates of SA1 afferents, Hz, a whole map or at the vertices: the effect `afferents`;
@@ -156,6 +158,7 @@ impl Answer {
             touch: None,
             pressure_pa: Vec::new(),
             shear_pa: Vec::new(),
+            displacement_mm: Vec::new(),
             vertices: Vec::new(),
             rates: Vec::new(),
             summary: None,
@@ -225,6 +228,9 @@ impl Answer {
                 SectionName::Pressure => self.pressure_pa = floats(part)?,
                 SectionName::Shear => {
                     self.shear_pa = floats(part)?.as_chunks::<3>().0.to_vec();
+                }
+                SectionName::Displacement => {
+                    self.displacement_mm = floats(part)?.as_chunks::<3>().0.to_vec();
                 }
                 SectionName::Vertices => {
                     self.vertices = vec![0.0; part.len() / header.sample_type.bytes()];

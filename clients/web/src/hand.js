@@ -21,6 +21,7 @@ import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, V
  * @property {Touch} touch
  * @property {Float32Array | null} pressurePa as a map or at the vertices, if asked for
  * @property {Float32Array | null} shearPa traction along the skin, x y z a vertex in the finger's frame, if asked for
+ * @property {Float32Array | null} displacementMm how far each vertex has moved, x y z, mm, in the finger's frame, if asked for
  * @property {Float32Array | null} vertices what the map shows at the vertices, if asked for in its place
  * @property {Float32Array | null} map 224 x 224, 0 outside the answer's window, if asked for
  * @property {Float32Array | null} summary
@@ -328,6 +329,7 @@ function read(data, view, ready) {
     touch: touchOf(of('touch') ?? new Float32Array(16)),
     pressurePa: of('pressure'),
     shearPa: of('shear'),
+    displacementMm: of('displacement'),
     vertices: of('vertices'),
     map: mapOf(data, view, ready),
     summary: of('summary'),

@@ -90,6 +90,8 @@ export interface HandHello {
   pressure?: 'map' | 'vertices';
   /** Answers carry `shearPa`. */
   shear?: boolean;
+  /** Answers carry `displacementMm`. */
+  displacement?: boolean;
   /** Of gaps: a coefficient, and whether frames tell how things move. */
   friction?: number;
   velocity?: boolean;
@@ -135,7 +137,7 @@ export interface Touch {
 }
 
 export interface Section {
-  name: 'touch' | 'pressure' | 'shear' | 'summary' | 'points' | 'point_rates' | 'actuators' | 'spikes' | 'rates' | 'map' | 'vertices';
+  name: 'touch' | 'pressure' | 'shear' | 'displacement' | 'summary' | 'points' | 'point_rates' | 'actuators' | 'spikes' | 'rates' | 'map' | 'vertices';
   offset: number;
   bytes: number;
 }

@@ -33,6 +33,7 @@ mod clusters;
 mod compliance;
 mod counting;
 mod discs;
+mod displacement;
 mod error;
 mod file;
 mod force_target;
@@ -61,6 +62,7 @@ mod springs;
 const PA_PER_MPA: f64 = 1e6;
 
 pub use answer::{Contact, Effort, Person, Quality};
+pub use displacement::Displacement;
 pub use error::{ContactError, ModelError};
 pub use force_target::NetForce;
 pub use gaps::Gaps;

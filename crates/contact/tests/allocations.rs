@@ -2,8 +2,8 @@
 
 use papilla_atlas::{Atlas, Patch, PatchVertices, Raster};
 use papilla_contact::{
-    Arrays, Contact, ContactModel, Gaps, Header, Layer, Method, NetForce, Object, PixelContact,
-    PixelSkin, PixelSpacing, Settings, Solver,
+    Arrays, Contact, ContactModel, Displacement, Gaps, Header, Layer, Method, NetForce, Object,
+    PixelContact, PixelSkin, PixelSpacing, Settings, Solver,
 };
 use papilla_sdf::{Placement, Sphere};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -82,6 +82,8 @@ fn a_warm_frame_takes_no_memory() {
     };
     let mut solver = Solver::new(model.clone(), settings).expect("a solver");
     let mut out = Contact::new(model.vertices());
+    let mut displacement = Displacement::new(&solver);
+    let mut moved_mm = vec![[0.0; 3]; model.vertices()];
     let objects: Vec<_> = (0..20).map(ball).collect();
     let depth_mm: Vec<f32> = (0..model.vertices()).map(|i| 0.02 - 1e-4 * i as f32).collect();
     let net = NetForce { direction: [0.0, 0.0, 1.0], force_n: 0.005 };
@@ -97,6 +99,7 @@ fn a_warm_frame_takes_no_memory() {
         let objects = std::slice::from_ref(object);
         solver.solve_on_pixels(objects, &mut pixels, &mut out).expect("an answer");
         assert!(out.force_n[2] > 0.0);
+        displacement.fill(&solver, Some(&pixels), &out, &mut moved_mm);
         solver.solve_for_force_on_pixels(objects, net, &mut pixels, &mut out).expect("a travel");
         solver.solve(&[] as &[Object; 0], &mut out).expect("an answer");
     };

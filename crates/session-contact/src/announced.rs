@@ -25,6 +25,7 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
         (hello.stiffness.is_some(), "stiffness"),
         (hello.pressure.is_some(), "pressure"),
         (hello.shear.is_some(), "shear"),
+        (hello.displacement.is_some(), "displacement"),
     ];
     if let (Input::Pressure, Some((_, member))) = (input, of_solve.iter().find(|(there, _)| *there))
     {

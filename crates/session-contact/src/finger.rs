@@ -37,6 +37,8 @@ pub struct Finger {
     raster: Arc<Raster>,
     pressure: Option<SampleLayout>,
     has_shear: bool,
+    /// How far each vertex has moved, mm; empty if the hello does not ask.
+    moved_mm: Vec<[f32; 3]>,
     /// By the effect `shear_energy`.
     shear_energy: Option<ShearEnergy>,
     /// The pressure that is sent, if as a map.
@@ -111,6 +113,7 @@ impl Finger {
             raster: Arc::clone(skin.raster),
             pressure: hello.pressure,
             has_shear: hello.shear == Some(true),
+            moved_mm: vec![[0.0; 3]; if hello.displacement == Some(true) { vertices } else { 0 }],
             shear_energy: shear_energy(hello, skin)?,
             sent_pa: vec![0.0; if sends_map { MAP_LEN } else { 0 }],
             touch: Touch::default(),
@@ -158,7 +161,8 @@ impl Finger {
             SampleLayout::Vertices => 4 * self.out.pressure_pa.len(),
         });
         let shear = if self.has_shear { 12 * self.out.shear_pa.len() } else { 0 };
-        (touch + pressure).next_multiple_of(16) + shear.next_multiple_of(16)
+        let moved = 12 * self.moved_mm.len();
+        [touch + pressure, shear, moved].map(|bytes| bytes.next_multiple_of(16)).iter().sum()
     }
 
     /// Stiffness of the tissue over that of the reference finger: the network is asked about
@@ -242,7 +246,7 @@ impl Finger {
             }
         };
         let start = Instant::now();
-        let Self { solver: Some(solver), out, objects, gaps, .. } = self else {
+        let Self { solver: Some(solver), out, objects, gaps, moved_mm, .. } = self else {
             return Err(Problem::new(ErrorCode::Internal, "a finger without a solver"));
         };
         let scene = gaps.as_ref().map_or(Scene::Objects(objects), |g| Scene::Gaps(g.gaps()));
@@ -267,6 +271,7 @@ impl Finger {
             share: out.quality.share,
             solve_us: start.elapsed().as_secs_f32() * 1e6,
         };
+        solver.displace(out, moved_mm);
         Ok(self.taken(map_pa))
     }
 
@@ -327,8 +332,8 @@ impl Finger {
         self.gaps.as_mut().map_or(Ok(()), |gaps| gaps.restore(state))
     }
 
-    /// Appends what pushes back, and pressure and shear if they were asked for, each up to a
-    /// multiple of 16.
+    /// Appends what pushes back, and pressure, shear and displacement if they were asked for, each
+    /// up to a multiple of 16.
     pub fn write(&mut self, bytes: &mut BytesMut) {
         if std::mem::take(&mut self.is_lost) {
             bytes.resize(bytes.len() + self.sections_len(), 0);
@@ -347,7 +352,7 @@ impl Finger {
             }
         };
         let shear_pa = if self.has_shear { out.shear_pa.as_flattened() } else { &[] };
-        for values in [pressure_pa, shear_pa] {
+        for values in [pressure_pa, shear_pa, self.moved_mm.as_flattened()] {
             for value in values {
                 bytes.extend_from_slice(&value.to_le_bytes());
             }

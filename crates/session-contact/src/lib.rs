@@ -236,10 +236,12 @@ fn sections(hello: &Hello, input: Input, vertices: usize) -> Vec<Section> {
     let mut offset = HEADER_LEN;
     let mut sections = Vec::new();
     let shear = (hello.shear == Some(true)).then_some(12 * vertices);
+    let displacement = (hello.displacement == Some(true)).then_some(12 * vertices);
     let all = [
         (SectionName::Touch, touch),
         (SectionName::Pressure, pressure),
         (SectionName::Shear, shear),
+        (SectionName::Displacement, displacement),
     ];
     for (name, bytes) in all {
         let Some(bytes) = bytes else { continue };

@@ -41,6 +41,11 @@ impl Chosen {
                                name 'second_order'";
                 Err(unusable("method", message))
             }
+            (Some(ContactMethod::Springs), _) if hello.displacement == Some(true) => {
+                let message = "springs give way each by itself, so that they know no 'displacement' \
+                               of the skin; leave 'method' out, or name 'second_order'";
+                Err(unusable("method", message))
+            }
             (Some(method), _) => Ok(Some(Self { method, warning: None })),
             (None, None) => Ok(Some(Self { method: ContactMethod::Pixels, warning: None })),
             (None, Some(obstacle)) => {

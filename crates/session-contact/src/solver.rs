@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use papilla_contact::{
-    Contact, ContactError, ContactModel, NetForce, Person, PixelContact, Scene, Settings, Solver,
+    Contact, ContactError, ContactModel, Displacement, NetForce, Person, PixelContact, Scene,
+    Settings, Solver,
 };
 use papilla_proto::{ErrorCode, Hello, Problem};
 use papilla_session_state::{Reader, StateError, Writer};
@@ -15,6 +16,8 @@ pub(crate) struct FingerSolver {
     solver: Solver,
     pixels: Option<PixelContact>,
     has_friction: bool,
+    /// If the hello asks for it.
+    displacement: Option<Displacement>,
 }
 
 impl FingerSolver {
@@ -35,7 +38,10 @@ impl FingerSolver {
             .pixel_spacing()
             .zip(skin.pixels)
             .map(|(spacing, skin)| PixelContact::new(Arc::clone(skin), model, spacing));
-        Ok(Self { solver: solver.map_err(|error| of_contact(&error))?, pixels, has_friction })
+        let solver = solver.map_err(|error| of_contact(&error))?;
+        let displacement = hello.displacement == Some(true);
+        let displacement = displacement.then(|| Displacement::new(&solver));
+        Ok(Self { solver, pixels, has_friction, displacement })
     }
 
     /// Finds what presses; returns how far things travelled to meet a net force, mm.
@@ -55,6 +61,14 @@ impl FingerSolver {
             }
             (_, scene, Some(net)) => solver.solve_for_force(scene, net, out),
             (_, scene, None) => solver.solve(scene, out).map(|()| 0.0),
+        }
+    }
+
+    /// Fills in how far each vertex of the skin has moved in the last frame, mm, if the hello asks.
+    pub(crate) fn displace(&mut self, out: &Contact, moved_mm: &mut [[f32; 3]]) {
+        let Self { solver, pixels, displacement, .. } = self;
+        if let Some(displacement) = displacement {
+            displacement.fill(solver, pixels.as_ref(), out, moved_mm);
         }
     }
 

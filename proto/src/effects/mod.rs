@@ -322,6 +322,8 @@ pub enum SectionName {
     Pressure,
     /// Traction along the skin, three f32 a vertex, Pa, in the finger's frame.
     Shear,
+    /// How far the skin has moved, three f32 a vertex, mm, in the finger's frame.
+    Displacement,
     /// A [`Summary`](crate::Summary).
     Summary,
     /// SED, one f32 a point, J/m3.

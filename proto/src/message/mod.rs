@@ -185,6 +185,9 @@ pub struct Hello {
     /// Whether answers carry the traction along the skin at the atlas' vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear: Option<bool>,
+    /// Whether answers carry how far the skin has moved, at the atlas' vertices.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displacement: Option<bool>,
     /// Coulomb's coefficient of friction of what gaps tell of, 0 to 10; none: it is slippery.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
@@ -260,6 +263,7 @@ impl Default for Hello {
             stiffness: None,
             pressure: None,
             shear: None,
+            displacement: None,
             friction: None,
             velocity: None,
             traction: None,

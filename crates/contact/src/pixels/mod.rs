@@ -186,6 +186,18 @@ impl PixelContact {
         self.peak_pa
     }
 
+    /// Forces on the skin's vertices after the last frame, N: what pixels hold, summed under hats.
+    pub(crate) fn forces(&self, force_n: &mut [Vec<f32>; 3]) {
+        for (force, found) in force_n.iter_mut().zip(self.turns.answered()) {
+            force.copy_from_slice(found);
+        }
+    }
+
+    /// Fills in how far the vertices near the last frame's pixels have moved, reference mm.
+    pub(crate) fn moved_near(&self, model: &ContactModel, moved: &mut [Vec<f32>; 3]) {
+        self.window.moved_near(&self.skin, model, moved);
+    }
+
     /// Forgets the last frame.
     pub fn reset(&mut self) {
         self.held_pa.fill(0.0);

@@ -72,6 +72,11 @@ impl Turns {
         &mut self.found
     }
 
+    /// The last round's forces.
+    pub(super) fn answered(&self) -> &Vectors {
+        &self.found
+    }
+
     /// Whether the next frame starts from this one.
     pub(super) fn is_warm(&self) -> bool {
         self.warm

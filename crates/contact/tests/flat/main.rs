@@ -1,5 +1,6 @@
 //! A flat patch of an elastic half-space, where answers are known in closed form.
 
+mod displacement;
 mod friction;
 mod gaps;
 mod memory;

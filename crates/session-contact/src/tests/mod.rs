@@ -238,6 +238,31 @@ fn aside(by_mm: f32) -> [u8; POSE_LEN] {
     Pose { origin_mm: [0.0, by_mm, 0.3 - 20.0], ..Pose::default() }.encode()
 }
 
+/// The last section has how far each vertex moved: most under the ball, and nothing without it.
+#[test]
+fn a_hello_can_ask_how_far_skin_moves() {
+    let plane = Plane::new();
+    let hello =
+        Hello { displacement: Some(true), pressure: Some(SampleLayout::Vertices), ..objects() };
+    let hand = plane.hand(&hello).expect("a hand");
+    let vertices = SIDE * SIDE;
+    let Section { name, offset, bytes } = *hand.sections().last().expect("sections");
+    assert_eq!((name, bytes), (SectionName::Displacement, 12 * vertices as u32));
+    let moved = |depth_mm: f32| {
+        let mut finger = hand.fingers()[0].lock().expect("no panic");
+        finger.take(frame(&pose(depth_mm), 0), None).expect("an answer");
+        let mut written = BytesMut::new();
+        finger.write(&mut written);
+        assert_eq!(written.len(), finger.sections_len());
+        let floats = written[offset as usize - HEADER_LEN..][..bytes as usize].as_chunks::<4>().0;
+        floats.iter().map(|b| f32::from_le_bytes(*b)).collect::<Vec<_>>()
+    };
+    let pressed = moved(0.3);
+    let most = pressed.as_chunks::<3>().0.iter().map(|u| u[2]).fold(0.0, f32::max);
+    assert!((0.2..0.4).contains(&most), "{most} mm under a ball 0.3 mm deep");
+    assert!(moved(-5.0).iter().all(|u| *u == 0.0));
+}
+
 /// The touch has the pull, the section behind it the traction at each vertex; and it goes on where
 /// the session goes.
 #[test]
@@ -400,6 +425,14 @@ fn bad_hellos_are_refused_by_member() {
         (rough(11.0), "objects[0].friction"),
         (Hello { method: Some(ContactMethod::Springs), ..rough(0.5) }, "method"),
         (Hello { input: None, objects: None, ..rough(0.5) }, "shear"),
+        (
+            Hello { displacement: Some(true), input: None, objects: None, ..objects() },
+            "displacement",
+        ),
+        (
+            Hello { displacement: Some(true), method: Some(ContactMethod::Springs), ..objects() },
+            "method",
+        ),
         (Hello { fingers: Some(Vec::new()), ..objects() }, "fingers"),
         (Hello { fingers: Some(vec![AnnouncedFinger::default(); 11]), ..objects() }, "fingers"),
         (Hello { fingers: Some(vec![thin]), ..objects() }, "fingers[0].width"),

@@ -44,6 +44,7 @@ impl Shape {
             resume: None,
             answer_layout: None,
             pressure: None,
+            displacement: None,
             ..hello.clone()
         };
         // A hello that came as JSON goes as JSON.

@@ -38,6 +38,7 @@ impl Window {
         let bead_mm = BEAD * skin.apart_mm;
         for slot in 0..self.entries.len() {
             let inward = self.inward[slot];
+            self.own_mm[slot] = 0.0;
             if view.is_spent(effort) {
                 // What is known presses there.
                 (self.give[slot], self.gap_mm[slot]) = (0.0, 0.0);
@@ -47,6 +48,7 @@ impl Window {
             let stencil = &skin.stencils[self.entries[slot] as usize];
             let dent = stencil.value(|vertex| self.dent_mm[vertex]);
             let own = grid[self.cells[slot] as usize] - dent;
+            self.own_mm[slot] = own;
             let (mut way, mut turns) = (0.0, 0);
             let (nearest, along) = loop {
                 let at: [f32; 3] = std::array::from_fn(|i| {

@@ -35,6 +35,8 @@ pub(super) struct Window {
     /// The skin's normal, into the finger.
     inward: Vec<[f32; 3]>,
     gap_mm: Vec<f32>,
+    /// How far pixels move by themselves, beside the vertices round them, mm along `inward`.
+    own_mm: Vec<f32>,
     /// How far the object gives way, mm/MPa.
     pub give: Vec<f32>,
     /// Coefficient of friction of the object.
@@ -100,6 +102,7 @@ impl Window {
             area_mm2: vec![0.0; pixels],
             inward: vec![[0.0; 3]; pixels],
             gap_mm: vec![0.0; pixels],
+            own_mm: vec![0.0; pixels],
             give: vec![0.0; pixels],
             friction: vec![0.0; pixels],
             ease: vec![0.0; pixels],

@@ -5,6 +5,7 @@ use crate::kernels::{DisplaceTiles, run};
 use crate::model::ContactModel;
 use crate::pixels::PixelSkin;
 use crate::second_order::Amplitudes;
+use papilla_atlas::MAP_SIDE_PX;
 
 impl Window {
     /// Moves the stencils' vertices under the vertices' forces.
@@ -46,6 +47,41 @@ impl Window {
                 self.vertices[*id as usize][i] = rest[i] as f32 + self.moved[i][slot];
             }
         }
+    }
+
+    /// Fills in how far these vertices have moved: as the pixel that shows them, if there is one.
+    pub(in super::super) fn moved_near(
+        &self,
+        skin: &PixelSkin,
+        model: &ContactModel,
+        moved: &mut [Vec<f32>; 3],
+    ) {
+        for id in &self.ids {
+            let vertex = *id as usize;
+            let of_pixel = self.pixel_at(skin.uv_px[vertex]).map(|slot| {
+                let rest = skin.rest_mm[self.entries[slot] as usize];
+                let (at, own, inward) = (self.at_mm[slot], self.own_mm[slot], self.inward[slot]);
+                [0, 1, 2].map(|i| at[i] + own * inward[i] - rest[i])
+            });
+            let (now, rest) = (self.vertices[vertex], model.positions_mm[vertex]);
+            let by = of_pixel.unwrap_or([0, 1, 2].map(|i| now[i] - rest[i] as f32));
+            for (moved, by) in moved.iter_mut().zip(by) {
+                moved[vertex] = by;
+            }
+        }
+    }
+
+    /// The pixel at a place of the map, or one beside it where not all are looked at.
+    fn pixel_at(&self, [u, v]: [f32; 2]) -> Option<usize> {
+        let [column, row] = [u, v].map(|c| c.max(0.0) as usize);
+        let beside = [[0, 0], [0, 1], [1, 0], [1, 1]];
+        let mut slots = beside.iter().filter_map(|[down, right]| {
+            let [row, column] = [row + down, column + right];
+            let inside = row < MAP_SIDE_PX && column < MAP_SIDE_PX;
+            let slot = inside.then(|| self.slot[row * MAP_SIDE_PX + column])?;
+            (slot != NONE).then_some(slot as usize)
+        });
+        slots.next()
     }
 
     /// Packs the vertices' forces, and puts them into the compliance's tiles.
