@@ -210,6 +210,7 @@ class Page {
     const note = byId('budget-note');
     note.replaceChildren();
     if (ready.method && byId('method').value === '') note.append(`Contact: ${nameOfMethod(ready.method)}. `);
+    for (const { question } of ready.warnings ?? []) note.append(`The service asks: ${question}. `);
     if (ready.meets_budget !== false) return;
     const budgetMs = ready.budget_us / 1000;
     const advice = this.#advice(ready.tier, budgetMs);
@@ -359,7 +360,7 @@ class Page {
       this.#setFriction(FRICTION);
       this.lentFriction = true;
     } else if (!this.effects.on.has('shear_energy') && this.lentFriction) {
-      // What came with the switch goes with it: friction is had at vertices alone, which are rougher.
+      // What came with the switch goes with it: nothing is computed that nobody named.
       this.#setFriction(0);
     }
     this.spikes.toggle(this.effects.on.has('spikes'));

@@ -188,8 +188,10 @@ impl PixelContact {
 
     /// Forces on the skin's vertices after the last frame, N: what pixels hold, summed under hats.
     pub(crate) fn forces(&self, force_n: &mut [Vec<f32>; 3]) {
-        for (force, found) in force_n.iter_mut().zip(self.turns.answered()) {
-            force.copy_from_slice(found);
+        let answered = self.turns.answered().iter().zip(&self.window.shear_n);
+        for (force, (normal, along)) in force_n.iter_mut().zip(answered) {
+            let sums = normal.iter().zip(along).map(|(normal, along)| normal + along);
+            force.iter_mut().zip(sums).for_each(|(force, sum)| *force = sum);
         }
     }
 

@@ -199,6 +199,17 @@ impl Solver {
         }
     }
 
+    /// Forces on the skin's vertices after the last frame, N.
+    pub(crate) fn forces(&self, force_n: &mut [Vec<f32>; 3]) {
+        let Slots { found, size, .. } = &self.patch.values;
+        for (force, found) in force_n.iter_mut().zip(found) {
+            force.fill(0.0);
+            for slot in (0..self.patch.near()).filter(|slot| size[*slot] > 0.0) {
+                force[self.patch.vertices()[slot] as usize] = found[slot];
+            }
+        }
+    }
+
     /// Calls `note` with each vertex under force, the size of its normal force and its force along the skin,
     /// N, after a frame in which something has friction; false after any other frame.
     pub(crate) fn each_rubbed(&self, mut note: impl FnMut(usize, f32, [f32; 3])) -> bool {
