@@ -36,6 +36,7 @@ class Progress:
 
 
 Listener = Callable[[Progress], None]
+Enough = Callable[[Checkpoint], bool]
 
 
 class Trainer:
@@ -80,10 +81,16 @@ class Trainer:
         if exists:
             self._resume()
 
-    def fit(self, listener: Listener = lambda _: None) -> Checkpoint:
-        """Train up to the epochs asked for; returns the last checkpoint."""
-        while self.state.epoch < self.config.epochs:
-            began = time.perf_counter()
+    def fit(
+        self, listener: Listener = lambda _: None, enough: Enough = lambda _: False
+    ) -> Checkpoint:
+        """Train up to the epochs asked for, or until the last checkpoint is ``enough``; returns it.
+
+        ``processor_seconds`` of an epoch is what the process itself used: on a busy machine less
+        than ``seconds``.
+        """
+        while self.state.epoch < self.config.epochs and not enough(self.state):
+            began, processor_began = time.perf_counter(), time.process_time()
             epoch = self.state.epoch + 1
             rate = self._learning_rate(epoch)
             for group in self.optimizer.param_groups:
@@ -91,12 +98,14 @@ class Trainer:
             train_loss = self._train_epoch(epoch, listener)
             validation_loss = self._validate()
             seconds = time.perf_counter() - began
+            processor_seconds = time.process_time() - processor_began
             line = {
                 "epoch": epoch,
                 "train_loss": train_loss,
                 "validation_loss": validation_loss,
                 "learning_rate": rate,
                 "seconds": seconds,
+                "processor_seconds": processor_seconds,
                 "samples_per_s": self.epoch_samples / seconds,
             }
             self._finish_epoch(line)

@@ -1,0 +1,54 @@
+"""A dataset whose states are shared out one by one, as the U-Net paper seems to have done.
+
+The states of one simulation resemble each other, so that a network which is tested on one of them
+has learnt from its neighbours. What is shipped is therefore tested on whole simulations. This view
+is here to measure what the other split hides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from papilla_trainer.dataset import Dataset, Press, State
+from papilla_trainer.maps import F32, DrawnMaps
+
+
+class SplitBySample(Dataset):
+    """As many states for testing as ``whole`` has, drawn by lot. Press 7 is the state in row 7."""
+
+    def __init__(self, whole: Dataset, seed: int) -> None:
+        self.whole = whole
+        self.directory, self.store = whole.directory, whole.store
+        self.atlas_hash, self.effects = whole.atlas_hash, whole.effects
+        self.vertex_count = whole.vertex_count
+        self.pressure_max_pa = whole.pressure_max_pa
+        self.sed_max_j_per_m3 = whole.sed_max_j_per_m3
+        self.dataset_sha256, self.hashes = whole.dataset_sha256, whole.hashes
+        states = sum(press.samples for press in whole.presses.values())
+        tests = sum(whole.presses[i].samples for i in whole.test_ids)
+        self.presses = {row: Press(row, 1) for row in range(states)}
+        order = np.random.default_rng([seed, 0x5A3B]).permutation(states).tolist()
+        self.test_ids, self.train_ids = sorted(order[:tests]), sorted(order[tests:])
+
+    @property
+    def drawn(self) -> DrawnMaps:  # type: ignore[override]
+        """The maps of the whole dataset."""
+        return self.whole.drawn
+
+    def mask(self) -> F32:
+        """As of the whole dataset."""
+        return self.whole.mask()
+
+    def states(self, ids: list[int]) -> list[State]:
+        """The states in these rows."""
+        maps = self.drawn
+        return [
+            State(
+                maps.pressure_pa[row],
+                maps.sed_j_per_m3[row],
+                row,
+                int(maps.state[row]),
+                float(maps.depth_mm[row]),
+            )
+            for row in ids
+        ]
