@@ -2,14 +2,17 @@
 """The U-Net paper's own experiment: its network, trained on a plate's states alone.
 
     python studies/unet_paper.py             trains what is not trained yet, then writes the report
-    python studies/unet_paper.py train       trains alone (a stopped run goes on at its last epoch)
-    python studies/unet_paper.py report      measures the last checkpoints and writes the report
+    python studies/unet_paper.py train       trains alone
+    python studies/unet_paper.py report      measures the last checkpoints, and writes the tables and
+                                             pictures of studies/reports/unet-paper.md
+
+A run that was stopped goes on at its last whole epoch. Each run has one thread; several are trained
+at once by as many commands `train`, each with its own --runs. Needs the trainer's requirements, and
+fe-datagen, which draws maps: FE_DATAGEN or PATH.
 """
 
 import argparse
-import dataclasses
 import json
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -21,11 +24,14 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "model-export/trainer")]
 
 from papilla_trainer.checkpoint import FILE_NAME, Checkpoint  # noqa: E402
+from papilla_trainer.comparison.measures import Zones, measure  # noqa: E402
 from papilla_trainer.comparison.split_by_sample import SplitBySample  # noqa: E402
 from papilla_trainer.config import TrainConfig  # noqa: E402
 from papilla_trainer.dataset import Dataset  # noqa: E402
 from papilla_trainer.files import write_atomic  # noqa: E402
 from papilla_trainer.maps import Store  # noqa: E402
+from papilla_trainer.serving import predict, served_model, spread  # noqa: E402
+from papilla_trainer.tasks import Samples  # noqa: E402
 from papilla_trainer.training import Trainer  # noqa: E402
 
 # More epochs than any budget of processor time allows.
@@ -43,6 +49,20 @@ NETWORKS = {
 SPLITS = ("simulation", "sample")
 DEFAULT_RUNS = ["s1-base16/simulation", "s1-base16/sample", "small/simulation", "nano/simulation"]
 SEED = 0
+# Learnt states that are asked again, beside those for testing.
+LEARNT = 100
+# A pixel of the U-Net's answer depends on pressures no further than this.
+SEES_PX = 22
+FIGURES = (
+    ("relative_l2", "relative L2"),
+    ("peak_error", "peak"),
+    ("far_field_relative_l2", "far field"),
+    ("nail_base_error", "zone toward the nail base"),
+)
+# Networks in the picture of maps.
+SHOWN = ("s1-base16", "small")
+REPORT = ROOT / "studies/reports/unet-paper.md"
+PICTURES = ROOT / "studies/reports/pictures"
 
 
 class Run:
@@ -68,9 +88,7 @@ def processor_seconds(state):
 
 
 def settings(run, epochs):
-    return TrainConfig(
-        **NETWORKS[run.network], epochs=epochs, seed=SEED, validation_presses=0, threads=1, device="cpu"
-    )
+    return TrainConfig(**NETWORKS[run.network], epochs=epochs, seed=SEED, validation_presses=0, threads=1, device="cpu")
 
 
 def epochs_within(run, whole, seconds):
@@ -98,8 +116,6 @@ def epochs_within(run, whole, seconds):
 @torch.no_grad()
 def held_out_loss(trainer, dataset, batch=8):
     """Loss of the states for testing, after an epoch. Nothing is chosen by it."""
-    from papilla_trainer.tasks import Samples
-
     paper = trainer.config.loss_name == "mse"
     units = (dataset.pressure_max_pa, dataset.sed_max_j_per_m3) if paper else (1.0, 1.0)
     samples = Samples(dataset.states(dataset.test_ids), trainer.device, units)
@@ -144,13 +160,301 @@ def train(run, whole, minutes, until):
     trainer.fit(listen, enough)
 
 
+class Answers:
+    """What a run's last checkpoint makes of states that it was tested on, and of some it learnt."""
+
+    def __init__(self, run, state, whole, zones):
+        self.run, self.state = run, state
+        dataset, model = run.dataset(whole), served_model(state, "last")
+        self.states = dataset.states(dataset.test_ids)
+        self.found = answers_of(model, self.states)
+        learnt = dataset.states(dataset.train_ids)
+        learnt = [learnt[i] for i in spread(len(learnt), LEARNT)]
+        self.errors = errors_of(self.found, self.states, zones)
+        self.learnt = errors_of(answers_of(model, learnt), learnt, zones)
+        self.history = state.history
+        self.held_out = json.loads((run.folder / "held-out.json").read_text())
+
+    @property
+    def minutes(self):
+        return processor_seconds(self.state) / 60.0
+
+
+def answers_of(model, states, batch=8):
+    pressure = [state.pressure_pa for state in states]
+    return np.concatenate([predict(model, np.stack(pressure[i : i + batch])) for i in range(0, len(pressure), batch)])
+
+
+def errors_of(found, states, zones):
+    """``[N]`` of each figure."""
+    each = [measure(map_, state.sed_j_per_m3, zones) for map_, state in zip(found, states, strict=True)]
+    return {figure: np.array([errors[figure] for errors in each]) for figure in each[0]}
+
+
+def percent(values, high=95):
+    """Median and far percentile."""
+    return f"{100 * np.nanmedian(values):.1f} / {100 * np.nanpercentile(values, high):.1f} %"
+
+
+def table(*rows):
+    head, *rest = ([str(cell) for cell in row] for row in rows)
+    return ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rest)]
+
+
+def accuracy_table(all_answers):
+    heads = ("network", "split", "epochs", "processor time", *(title for _, title in FIGURES))
+    rows = [
+        (
+            f"`{one.run.network}`",
+            f"by {one.run.split}",
+            one.state.epoch,
+            f"{one.minutes:.1f} min",
+            *(percent(one.errors[figure]) for figure, _ in FIGURES),
+        )
+        for one in all_answers
+    ]
+    return table(heads, *rows)
+
+
+def depth_table(all_answers):
+    depths = sorted({round(state.depth_mm, 2) for one in all_answers for state in one.states})
+    rows = []
+    for one in all_answers:
+        own = np.array([round(state.depth_mm, 2) for state in one.states])
+        cells = (f"{100 * np.median(one.errors['relative_l2'][own == depth]):.1f} %" for depth in depths)
+        rows.append((f"`{one.run.network}`", f"by {one.run.split}", *cells))
+    return table(("network", "split", *(f"{depth:g} mm" for depth in depths)), *rows)
+
+
+def gap(one):
+    """Error of states for testing over that of learnt states, medians."""
+    return np.median(one.errors["relative_l2"]) / np.median(one.learnt["relative_l2"])
+
+
+def flattery_table(all_answers):
+    rows = [
+        (
+            f"`{one.run.network}`",
+            f"by {one.run.split}",
+            percent(one.learnt["relative_l2"]),
+            percent(one.errors["relative_l2"]),
+            f"{gap(one):.2f}",
+        )
+        for one in all_answers
+    ]
+    return table(("network", "split", "states that it learnt", "states for testing", "testing / learnt"), *rows)
+
+
+def steps(one):
+    """Steps of Adam."""
+    samples = round(one.history[0]["samples_per_s"] * one.history[0]["seconds"])
+    return one.state.epoch * -(-samples // one.state.config["batch"])
+
+
+def convergence_table(all_answers):
+    rows = []
+    for one in all_answers:
+        train = [line["train_loss"] for line in one.history]
+        held_out = [line["loss"] for line in one.held_out]
+        planned = one.state.config["epochs"]
+        rows.append(
+            (
+                f"`{one.run.network}`",
+                f"by {one.run.split}",
+                f"{one.state.epoch}" + ("" if planned == ENDLESS else f" of {planned}"),
+                steps(one),
+                f"{train[-1]:.2e}",
+                change(train),
+                f"{held_out[-1]:.2e}",
+                change(held_out),
+            )
+        )
+    heads = ("network", "split", "epochs", "steps of Adam", "training loss", "its change in the last epoch")
+    return table((*heads, "loss of the states for testing", "its change in the last epoch"), *rows)
+
+
+def change(losses):
+    return f"{100 * (losses[-1] / losses[-2] - 1):+.0f} %" if len(losses) > 1 else ""
+
+
+def reached(pressure_pa):
+    """Pixels whose answer can depend on any pressure: 22 pixels around, for the published U-Net."""
+    touched = torch.from_numpy((pressure_pa > 0).astype(np.float32))[None, None]
+    wide = torch.nn.functional.max_pool2d(touched, 2 * SEES_PX + 1, stride=1, padding=SEES_PX)
+    return wide[0, 0].numpy() > 0
+
+
+def wider(sed, pressure_pa, mask, part=0.1):
+    """Area where SED is above a part of its maximum, over that of pressure."""
+    areas = [(map_[mask] > part * map_[mask].max()).sum() for map_ in (sed, pressure_pa)]
+    return areas[0] / areas[1]
+
+
+def statement_table(all_answers, zones):
+    """Each statement of the paper as numbers: of FE, and of the networks on whole simulations."""
+    judged = [one for one in all_answers if one.run.split == "simulation"]
+    states = judged[0].states
+    truth = [state.sed_j_per_m3 for state in states]
+    mask, zone = zones.mask, zones.nail_base
+    none = ["" for _ in judged]
+    trend = ["1"]
+    widths = [np.median([wider(s.sed_j_per_m3, s.pressure_pa, mask) for s in states])]
+    for one in judged:
+        r = [np.corrcoef(p[mask], t[mask])[0, 1] for p, t in zip(one.found, truth, strict=True)]
+        trend.append(f"{np.median(r):.3f} / {np.percentile(r, 5):.3f}")
+        widths.append(np.median([wider(p, s.pressure_pa, mask) for p, s in zip(one.found, states, strict=True)]))
+    share = [t[zone].sum() / t[mask].sum() for t in truth]
+    blind = [t[zone & ~reached(s.pressure_pa)].sum() / t[zone].sum() for t, s in zip(truth, states, strict=True)]
+    kept = [[p[zone].sum() / t[zone].sum() for p, t in zip(one.found, truth, strict=True)] for one in judged]
+    return table(
+        ("the paper's statement", "measured as", "FE", *(f"`{one.run.network}`" for one in judged)),
+        (
+            "'overall trend well reproduced'",
+            "correlation of SED with FE's over the pixels, median / 5th percentile",
+            *trend,
+        ),
+        ("", "error of the sum over the map", "", *(percent(one.errors["total_energy_error"]) for one in judged)),
+        (
+            "'wider than pressure'",
+            "area above a tenth of the maximum, SED over pressure, median",
+            *(f"{width:.2f}" for width in widths),
+        ),
+        (
+            "'spread toward the nail base not reproduced'",
+            "share of SED in the zone, median / 95th percentile",
+            percent(share),
+            *none,
+        ),
+        ("", "sum of SED in the zone over FE's, 5th percentile / median / 95th percentile", "1", *map(three, kept)),
+        ("", "relative L2 in the zone", "", *(percent(one.errors["nail_base_error"]) for one in judged)),
+        ("", "part of the zone's SED that lies further from any pressure than the U-Net sees", percent(blind), *none),
+    )
+
+
+def three(values):
+    return " / ".join(f"{value:.2f}" for value in np.nanpercentile(values, (5, 50, 95)))
+
+
+def draw_maps(all_answers, whole, zones):
+    """As the paper's figure 4: pressure, FE's SED, the network's, and the difference."""
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    import matplotlib.pyplot as plt
+
+    judged = {one.run.network: one for one in all_answers if one.run.split == "simulation"}
+    shown = [judged[name] for name in SHOWN if name in judged]
+    poses = {press["id"]: press for press in json.loads((whole.directory / "manifest.json").read_text())["presses"]}
+    deepest = {}
+    for row, state in enumerate(shown[0].states):
+        if state.press_id not in deepest or state.depth_mm > shown[0].states[deepest[state.press_id]].depth_mm:
+            deepest[state.press_id] = row
+    chosen = [min(deepest, key=lambda i: abs(poses[i]["pitch_deg"] - pitch)) for pitch in (0.0, 22.5, 45.0)]
+    titles = ["pressure, kPa", "SED, FE (truth), kJ/m³"]
+    for one in shown:
+        titles += [f"SED, {one.run.network}, kJ/m³", f"{one.run.network} - FE, kJ/m³"]
+    figure, axes = plt.subplots(3, len(titles), figsize=(2.9 * len(titles), 9.3), layout="constrained")
+    blank = np.where(zones.mask, 1.0, np.nan)
+    rows, columns = (np.flatnonzero(zones.mask.any(axis=axis)) for axis in (1, 0))
+    for line, press in zip(axes, chosen, strict=True):
+        state = shown[0].states[deepest[press]]
+        truth = 1e-3 * state.sed_j_per_m3
+        maps = [(1e-3 * state.pressure_pa, "magma", 0.0, None), (truth, "viridis", 0.0, truth.max())]
+        for one in shown:
+            found = 1e-3 * one.found[deepest[press]]
+            maps += [
+                (found, "viridis", 0.0, truth.max()),
+                (found - truth, "RdBu_r", -0.3 * truth.max(), 0.3 * truth.max()),
+            ]
+        for axis, (map_, colours, low, high) in zip(line, maps, strict=True):
+            image = axis.imshow(map_ * blank, cmap=colours, vmin=low, vmax=high)
+            axis.contour(zones.nail_base, levels=[0.5], colors="0.6", linewidths=0.8, linestyles="dotted")
+            axis.set(xticks=[], yticks=[], xlim=(columns[0], columns[-1]), ylim=(rows[-1], rows[0]))
+            figure.colorbar(image, ax=axis, shrink=0.75)
+        line[0].set_ylabel(
+            f"pitch {poses[press]['pitch_deg']:.0f}°, roll {poses[press]['roll_deg']:.0f}°, {state.depth_mm:g} mm"
+        )
+        for k, one in enumerate(shown):
+            line[3 + 2 * k].set_xlabel(
+                f"relative L2 {100 * one.errors['relative_l2'][deepest[press]]:.1f} %", fontsize=9
+            )
+    for axis, title in zip(axes[0], titles, strict=True):
+        axis.set_title(title, fontsize=10)
+    figure.savefig(PICTURES / "unet-paper-maps.png", dpi=90)
+
+
+def draw_losses(all_answers):
+    import matplotlib as mpl
+
+    mpl.use("agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
+    losses = ("mse", "relative")
+    titles = ("mean squared error of normalised maps", "relative loss")
+    for axis, loss, title in zip(axes, losses, titles, strict=True):
+        own = [one for one in all_answers if NETWORKS[one.run.network]["loss"] == loss]
+        for k, one in enumerate(own):
+            used = np.cumsum([line["processor_seconds"] for line in one.history]) / 60.0
+            label = f"{one.run.network}, by {one.run.split}"
+            axis.semilogy(
+                used,
+                [line["train_loss"] for line in one.history],
+                "o-",
+                ms=4,
+                color=f"C{k}",
+                label=f"{label}: training",
+            )
+            at = [used[int(line["epoch"]) - 1] for line in one.held_out]
+            axis.semilogy(
+                at, [line["loss"] for line in one.held_out], "s:", ms=4, color=f"C{k}", label=f"{label}: testing"
+            )
+        axis.set(title=title, xlabel="processor time, min", ylabel="loss")
+        axis.grid(visible=True, which="both", alpha=0.25)
+        axis.legend(fontsize=8)
+    figure.savefig(PICTURES / "unet-paper-losses.png", dpi=100)
+
+
+def fill(page, name, lines):
+    """Put lines between the page's marks of this name."""
+    begin, end = f"<!-- begin: {name}; studies/unet_paper.py writes it -->", f"<!-- end: {name} -->"
+    text = page.read_text()
+    if text.count(begin) != 1 or text.count(end) != 1:
+        sys.exit(f"error: {page} has no lines '{begin}' and '{end}', between which the table belongs")
+    before, rest = text.split(begin)
+    page.write_text(before + begin + "\n\n" + "\n".join(lines) + "\n\n" + end + rest.split(end)[1])
+
+
+def report(runs, whole):
+    """Measure the last checkpoints, and write tables and pictures."""
+    zones = Zones.of(whole)
+    found = [(run, run.checkpoint()) for run in runs]
+    for run, state in found:
+        if state is None:
+            print(f"{run.name}: not trained, left out", file=sys.stderr)
+    all_answers = [Answers(run, state, whole, zones) for run, state in found if state is not None]
+    if not any(one.run.split == "simulation" for one in all_answers):
+        sys.exit("error: no run by simulation is trained yet: run the command `train` first")
+    tables = {
+        "accuracy": accuracy_table(all_answers),
+        "split": flattery_table(all_answers),
+        "depth": depth_table(all_answers),
+        "statements": statement_table(all_answers, zones),
+        "convergence": convergence_table(all_answers),
+    }
+    for name, lines in tables.items():
+        print(f"\n{name}\n" + "\n".join(lines))
+        fill(REPORT, name, lines)
+    draw_maps(all_answers, whole, zones)
+    draw_losses(all_answers)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("all", "train", "report"), nargs="?", default="all")
     parser.add_argument("--runs", nargs="+", default=DEFAULT_RUNS, metavar="NETWORK/SPLIT")
     parser.add_argument("--minutes", type=float, default=30.0, help="processor time of each run (30)")
     parser.add_argument("--until", metavar="HH:MM", help="train no longer than this time of today")
-    parser.add_argument("--jobs", type=int, default=1, help="runs that are trained at once (1)")
     parser.add_argument("--dataset", type=Path, default=ROOT / "data/s1-graded")
     parser.add_argument("--maps", type=Path, help="where the maps of the dataset are (as of papilla_trainer)")
     parser.add_argument("--out", type=Path, default=ROOT / "out/unet-paper", help="the runs (out/unet-paper)")
@@ -165,6 +469,8 @@ def main():
     if options.what != "report":
         for run in runs:
             train(run, whole, options.minutes, until)
+    if options.what != "train":
+        report(runs, whole)
 
 
 if __name__ == "__main__":
