@@ -240,7 +240,8 @@ class Page {
     this.#followTier(answer.tierNumber);
     showFlags('flags', flagsOf(answer, this.mostPa));
     const touch = answer.touch ? readTouch(answer.touch) : null;
-    if (this.mode === 'press') this.sure.sed.show(answer.errorEstimate);
+    // Where nothing touches there is nothing to be wrong.
+    if (this.mode === 'press') this.sure.sed.show(answer.noContact ? null : answer.errorEstimate);
     if (touch) this.meters.press(touch);
     if (this.mode === 'press') {
       this.finger?.setForce(touch);
@@ -323,7 +324,7 @@ class Page {
     if (this.mode !== 'press') return;
     const { other, difference } = this.views;
     const { pixels } = this.atlas.interface.raster;
-    this.sure.other.show(answer.errorEstimate);
+    this.sure.other.show(answer.noContact ? null : answer.errorEstimate);
     const isSame = equal(first, this.pair.first) && equal(second, this.pair.second);
     const lacks = ['shear_energy', 'relaxation'].filter((name) => this.effects.on.has(name)).map((name) => LACKS[name]);
     put('other-ms', `${this.comparison.medianMs.toFixed(1)} ms, ${[this.comparison.isMethod ? 'contact and model' : 'model alone', ...lacks].join(', ')}`);

@@ -19,6 +19,7 @@ globalThis.matchMedia = () => ({ matches: false, addEventListener: () => {} });
 const load = (name) => import(pathToFileURL(join(folder, name)));
 const { Raster } = await load('raster.js');
 const { countDifferences, fringeOf } = await load('mask.mjs');
+const { sureWords } = await load('sure.mjs');
 const { HEADER_BYTES, MAP_LEN, RequestFrame, readAnswer } = await load('protocol.mjs');
 const { AutoRange, TABLES, digits, percentile, roundDown, roundUp } = await load('colour.mjs');
 const { Atlas } = await load('atlas.mjs');
@@ -28,7 +29,7 @@ const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
 const { OCTAHEDRON, SHAPES, heightsOfMesh, scaled } = await load('shapes.mjs');
 const { meshOf } = await load('mesh.mjs');
-const { bodyMesh, borderOf, nailMesh } = await load('body.mjs');
+const { bodyMesh, borderOf, followingOf, nailMesh } = await load('body.mjs');
 const { hashOf, npyOf, pythonOf, stateOf } = await load('share.mjs');
 const { rowsNear } = await load('spikes.mjs');
 const { verdictOf } = await load('hard.mjs');
@@ -432,4 +433,26 @@ test('the hard cases of the finite elements are those of the report', async () =
   const ends = cases.flatMap(({ variants }) => variants.map(([, end]) => end));
   const count = (...words) => ends.filter((end) => words.includes(end)).length;
   assert.equal(summary, `${ends.length} variants of ${cases.length} cases: ${count('converged', 'evaluated')} converged or evaluated, ${count('refused')} refused, 0 break their promise.`);
+});
+
+test('an answer says how wrong it is likely to be, or that nobody knows', () => {
+  assert.equal(sureWords(null), '', 'a service that tells nothing');
+  assert.equal(sureWords(Float32Array.of(0.0944, 0.214, 0.01, 0.05)), 'expected error 9.4 %; 9 in 10 such answers below 21 %');
+  assert.equal(sureWords(Float32Array.of(0.12, Infinity, 0, 0)), 'expected error 12 %');
+  assert.match(sureWords(new Float32Array(4).fill(Infinity)), /unknown/);
+});
+
+test('the rest of the finger follows the edge of its skin, and nothing far from it moves', () => {
+  const atlas = sphereAtlas(8);
+  const mesh = bodyMesh(atlas);
+  const { vertex, weight } = followingOf(atlas, mesh);
+  const border = new Set(borderOf(atlas.triangles));
+  assert.ok(vertex.every((at) => border.has(at)));
+  let [on, far] = [0, 0];
+  for (let n = 0; n < vertex.length; n++) {
+    const away = Math.hypot(...[0, 1, 2].map((k) => mesh[6 * n + k] - atlas.skin.positionsMm[3 * vertex[n] + k]));
+    if (away < 1e-5) on += weight[n] > 0.9999 ? 1 : NaN;
+    if (away > 9) far += weight[n] < 2e-4 ? 1 : NaN;
+  }
+  assert.ok(on > 100 && far > 10, `${on} vertices on the edge, ${far} far away`);
 });
