@@ -388,6 +388,14 @@ def long() -> list[Step]:
             tests_min=54,
         ),
         Step(
+            "mujoco",
+            "friction in the loop with MuJoCo: a ball rests, a block is held for ten seconds, then slips",
+            "clients/test mujoco",
+            after=("wheel",),
+            tests_min=3,
+            installs="pip: mujoco (8 MB)",
+        ),
+        Step(
             "client-crates",
             "the Rust client and what it is built on, compiled from their packages",
             "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS clients/packages-test crates",

@@ -235,7 +235,8 @@ class Finger:
 
     def _on(self, terms: dict[str, Any]) -> _native.Contact:
         """Contact on these terms: that of the call before, if they are the same."""
-        hello = json.dumps({"type": "hello", "version": wire.VERSION, **self._terms, **terms})
+        # No network runs here, so no SED is asked for.
+        hello = json.dumps({"type": "hello", "version": wire.VERSION, "map": False, **self._terms, **terms})
         if self._solved is None or hello != self._hello:
             contact = self._native.contact(hello)
             self._told = json.loads(contact.told())
