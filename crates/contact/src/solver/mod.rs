@@ -81,7 +81,7 @@ pub struct Settings {
     pub person: Person,
     /// Whether to find the local stiffness too, of the pressure alone.
     pub stiffness: bool,
-    /// Whether things may have friction: at vertices, with a method that knows compliance.
+    /// Whether things may have friction, with a method that knows compliance.
     pub friction: bool,
 }
 
