@@ -26,7 +26,7 @@ pub struct Evaluation {
     pub residual_norm: f64,
     /// How far displacement and independent dilatations are from equilibrium, N; 0 without.
     pub mixed_norm: f64,
-    /// Norm of contact, dead and support forces: what the residual is small against.
+    /// Norm of contact, pressure, dead and support forces: what the residual is small against.
     pub reference_norm: f64,
     /// Nominal traction of each contact point, MPa.
     pub traction_mpa: Vec<f64>,
@@ -42,7 +42,7 @@ pub struct Evaluation {
     pub j_min: f64,
     /// Block and element where it is.
     pub j_min_at: [usize; 2],
-    /// Sum of contact forces on the body, N.
+    /// Sum of contact forces and of pressure on the body, N.
     pub contact_force_n: [f64; 3],
     /// What of it is normal, N.
     pub normal_force_n: [f64; 3],
@@ -88,8 +88,11 @@ pub fn evaluate_body(
     lag.condense(problem);
     fluid(problem, trial, tangent.as_deref_mut(), out)?;
     out.potential_mj = out.stored_mj;
-    let mut reference = contact(problem, loading, trial, tangent, out);
+    let mut reference = contact(problem, loading, trial, tangent.as_deref_mut(), out);
     let share = loading.share(trial.load_fraction);
+    if let Some(pressure) = &loading.pressure {
+        reference += pressure.add(problem, trial.u, share, tangent, out);
+    }
     for (node, f) in loading.dead_n.iter().enumerate() {
         for i in 0..3 {
             let force = share * f[i];
@@ -301,7 +304,7 @@ impl Evaluation {
 /// Forces on the body at an equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Balance {
-    /// Force of the indenter on the body, N.
+    /// Force of the indenter, or of pressure, on the body, N.
     pub contact_force_n: [f64; 3],
     /// Part of it that acts along the indenter's normals, N.
     pub normal_force_n: [f64; 3],

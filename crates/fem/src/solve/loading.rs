@@ -1,5 +1,6 @@
-//! What acts on a body: dead forces, prescribed displacements, a moving indenter.
+//! What acts on a body: dead forces, pressure, prescribed displacements, a moving indenter.
 
+use super::pressure::SurfacePressure;
 use crate::contact::ContactRule;
 use papilla_sdf::{Distance, Placement, SignedDistance};
 use papilla_solid::tensor::norm;
@@ -83,7 +84,9 @@ pub struct Loading {
     /// Prescribed displacements at fraction 1: `(degree of freedom, mm)`; the
     /// other prescribed degrees of freedom stay 0.
     pub prescribed_mm: Vec<(usize, f64)>,
-    /// Share of dead forces and prescribed displacements at rising load fractions, linear in between
+    /// Pressure at fraction 1, which follows the surface that it acts on.
+    pub pressure: Option<Arc<SurfacePressure>>,
+    /// Share of dead forces, pressure and prescribed displacements at rising load fractions, linear in between
     /// and from 0 at 0; the load fraction itself if empty.
     pub course: Vec<(f64, f64)>,
     /// Indenter.
@@ -101,7 +104,7 @@ impl Loading {
         self.indenter.as_ref().map_or(ContactRule::Nodal, |m| m.contact)
     }
 
-    /// Share of dead forces and prescribed displacements that acts at a load fraction.
+    /// Share of dead forces, pressure and prescribed displacements that acts at a load fraction.
     pub(super) fn share(&self, fraction: f64) -> f64 {
         let Some(&last) = self.course.last() else { return fraction };
         let next = self.course.partition_point(|&(at, _)| at < fraction);

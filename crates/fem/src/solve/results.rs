@@ -80,6 +80,12 @@ impl<'a> Solver<'a> {
         self.loading.indenter.as_ref().map_or(0.0, |m| self.work.total_mj(m))
     }
 
+    /// Work of pressure so far, mJ, on straight ways of the nodes from equilibrium to equilibrium.
+    #[must_use]
+    pub fn pressure_work_mj(&self) -> f64 {
+        self.work.pressure_mj
+    }
+
     /// Largest amount of the indenter's work at an equilibrium so far, mJ: what energies are
     /// small against once the indenter has given its work back.
     #[must_use]

@@ -302,6 +302,11 @@ impl<'a> Solver<'a> {
         let before = &self.state.friction;
         friction::anchor(problem, &self.loading, next, &trial.u, before, &mut trial.friction);
         fluid::advance(problem, self.state.fluid.as_ref(), &trial.u, &mut trial.fluid);
+        if let Some(pressure) = &self.loading.pressure {
+            let shares = [self.state.fraction, next].map(|fraction| self.loading.share(fraction));
+            self.work.pressure_mj +=
+                pressure.work_mj(&problem.mesh, [&self.state.u, &trial.u], shares);
+        }
         self.before = Some(std::mem::replace(&mut self.state, trial));
         if let Some(indenter) = &self.loading.indenter {
             let Evaluation { contact_force_n, stored_mj, contact_mj, .. } = self.newton.current;

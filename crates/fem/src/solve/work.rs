@@ -17,6 +17,8 @@ pub(super) struct Work {
     sum_mj: f64,
     /// Its largest amount so far.
     pub largest_mj: f64,
+    /// Work of pressure, mJ.
+    pub pressure_mj: f64,
 }
 
 /// An equilibrium of a straight path.
