@@ -10,6 +10,7 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 - `Model`: SED of a map or many, computed in this process
 - `Finger`, `Hand`: what pushes back on one finger or several, computed in this process
 - `fe`: finite elements in this process: scenes explained and solved, states with maps and fields
+- `afferents`, `actuators`: firing rates, spikes and intensities of SED that is known
 - `SpikeTrains`: when the touch units of a finger fire, as files
 - `sensors`: readings of an array of taxels to pressure, SED, rates and spikes
 - `devices`, `hjif`: what controllers and gloves take, and recorded touches as HJIF files
@@ -22,7 +23,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import devices, fe, frames, hjif, meshes, sensors
+    from . import actuators, afferents, devices, fe, frames, hjif, meshes, sensors
     from .aio import AsyncSession
     from .answer import Answer, Problem, Spikes, Summary, Touch
     from .atlas import Atlas, Contact
@@ -90,6 +91,8 @@ __all__ = [
     "Summary",
     "Touch",
     "Unreachable",
+    "actuators",
+    "afferents",
     "devices",
     "fe",
     "frames",
@@ -140,7 +143,7 @@ _NAMES = {
     "wire": ("SIDE_PX",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
-_MODULES = (*_NAMES, "devices", "fe", "frames", "hjif", "meshes", "sensors")
+_MODULES = (*_NAMES, "actuators", "afferents", "devices", "fe", "frames", "hjif", "meshes", "sensors")
 
 if not TYPE_CHECKING:  # type checkers see the imports above, and refuse other names
 

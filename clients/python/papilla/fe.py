@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from . import check
 from .errors import BadInput, BadScene
 from .model import native
-from .wire import SIDE_PX, Map
+from .wire import SIDE_PX, WHOLE, Map
 
 if TYPE_CHECKING:
     from . import _native
@@ -214,15 +215,23 @@ class Scene:
     (docs/reference/scenes.md). Raises BadScene, whose `field` and `line` say where.
     """
 
-    def __init__(self, source: str | os.PathLike[str] | Mapping[str, Any]) -> None:
+    def __init__(
+        self, source: str | os.PathLike[str] | Mapping[str, Any], *, pressure: ArrayLike | None = None
+    ) -> None:
+        """`pressure` is a map (224, 224) on the finger's atlas, Pa, which presses in place of an indenter; it stands
+        for `pressure.file` of the scene."""
         scene = native().Scene
+        map_pa = None
+        if pressure is not None:
+            map_pa = np.ascontiguousarray(check.samples(pressure, WHOLE))
+        self._pressure = map_pa
         self._native: _native.Scene
         if isinstance(source, Mapping):
-            self._native = scene(Path("scene.toml"), json.dumps(_plain(source)), True)
+            self._native = scene(Path("scene.toml"), json.dumps(_plain(source)), True, map_pa)
         elif isinstance(source, str) and "\n" in source:
-            self._native = scene(Path("scene.toml"), source)
+            self._native = scene(Path("scene.toml"), source, False, map_pa)
         else:
-            self._native = scene(Path(source))
+            self._native = scene(Path(source), None, False, map_pa)
 
     def as_dict(self) -> dict[str, Any]:
         """All members of the scene, those too that were not given."""
@@ -268,7 +277,8 @@ class Scene:
         found = []
         for name in members["effects"]:
             try:
-                less = Scene({**members, "effects": [other for other in members["effects"] if other != name]})
+                others = [other for other in members["effects"] if other != name]
+                less = Scene({**members, "effects": others}, pressure=self._pressure)
                 seconds = less.explain()["forecast"]["seconds"]["total"]
             except BadScene as error:
                 found.append(Effect(name, whole, float("nan"), None, None, str(error)))

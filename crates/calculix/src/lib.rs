@@ -62,6 +62,12 @@ pub enum ExportError {
          motion.depth_mm; `fe-datagen solve` prints the depth that a force takes"
     )]
     Force,
+    /// Pressure that follows the skin.
+    #[error(
+        "a deck presses with an indenter; the scene has a table [pressure] in its place, which \
+         `fe-datagen solve` takes"
+    )]
+    Pressure,
     /// A shape that no rigid surface here stands for.
     #[error("no deck for the indenter '{shape}': plates, spheres and cylinders can be exported")]
     Indenter {

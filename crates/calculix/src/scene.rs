@@ -57,6 +57,7 @@ impl SceneDeck {
                 points.iter().map(|p| p.time_s / last).collect()
             }
             Drive::Forces(_) => return Err(ExportError::Force.into()),
+            Drive::Shares(_) => return Err(ExportError::Pressure.into()),
         };
         let mut cards = [const { None }; Tissue::ALL.len()];
         for tissue in Tissue::ALL {

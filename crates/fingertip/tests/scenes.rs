@@ -31,7 +31,8 @@ const REST: &str =
 
 /// Puts what `whole` has and the example lacks into the example, table by table.
 fn complete(example: &mut Table, whole: &Table) {
-    for (key, value) in whole {
+    let presses = example.contains_key("pressure");
+    for (key, value) in whole.iter().filter(|(key, _)| !(presses && *key == "motion")) {
         match (example.get_mut(key), value) {
             (None, _) => drop(example.insert(key.clone(), value.clone())),
             (Some(Value::Table(own)), Value::Table(other))

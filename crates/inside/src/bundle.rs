@@ -52,6 +52,14 @@ impl Bundle {
         Self::read(folder, Some(&contact), None)
     }
 
+    /// Reads the atlas of a folder alone.
+    ///
+    /// # Errors
+    /// It is missing or damaged.
+    pub fn without_contact(folder: &Path) -> Result<Self, LoadError> {
+        Self::read(folder, None, None)
+    }
+
     /// Reads the atlas of a folder, which has to have this hash, and the contact model that is named.
     pub(crate) fn read(
         folder: &Path,

@@ -3,7 +3,7 @@
 //!
 //! [`Session`] takes the protocol's hello and frames as the service does, and makes the same
 //! sections of an answer; only sockets, queues and deadlines are missing. [`Contact`] is one finger
-//! that is touched, without a network.
+//! that is touched, and [`Feel`] what is felt of SED that is known, both without a network.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,12 +22,14 @@
 
 mod bundle;
 mod contact;
+mod feel;
 mod hello;
 mod model;
 mod session;
 
 pub use bundle::Bundle;
 pub use contact::{Contact, Solved};
+pub use feel::Feel;
 pub use hello::read_hello;
 pub use model::{LoadError, Model};
 pub use papilla_proto::Problem;

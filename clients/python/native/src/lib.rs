@@ -5,6 +5,7 @@
 //! wherever something is computed, and a panic ends in `papilla.NativeFault`.
 
 mod border;
+mod feel;
 mod finger;
 mod models;
 mod scene;
@@ -17,6 +18,7 @@ use pyo3::prelude::*;
 #[pyo3(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<feel::Feel>()?;
     module.add_class::<finger::Contact>()?;
     module.add_class::<finger::Finger>()?;
     module.add_class::<models::Models>()?;

@@ -25,6 +25,7 @@ use papilla_fingertip::{
     },
 };
 use pyo3::{
+    buffer::PyBuffer,
     prelude::*,
     types::{PyBytes, PyDict},
 };
@@ -122,6 +123,10 @@ fn unsolved(error: &SimulationError) -> Option<(&'static str, Option<f64>, Optio
             };
             Some((kind, Some(*depth_mm), reached))
         }
+        SimulationError::Share { share, source } => {
+            let at = SimulationError::Solve { depth_mm: 0.0, source: source.clone() };
+            unsolved(&at).map(|(kind, _, reached)| (kind, None, reached.or(Some(*share))))
+        }
         SimulationError::Slipped { depth_mm, .. } => Some(("slipped", Some(*depth_mm), None)),
         SimulationError::Force { .. } => Some(("force_not_reached", None, None)),
         SimulationError::Inverted(_) => Some(("inverted", None, None)),
@@ -139,17 +144,25 @@ pub(crate) struct Scene {
 #[pymethods]
 impl Scene {
     /// Reads the text of a scene, in TOML or, if `json` says so, as a JSON object; `path` is where it
-    /// stands, or would stand.
+    /// stands, or would stand. `pressure_pa` is a map of 224 x 224 that presses in place of an indenter.
     #[new]
-    #[pyo3(signature = (path, text=None, json=false))]
-    fn new(py: Python<'_>, path: PathBuf, text: Option<String>, json: bool) -> PyResult<Self> {
+    #[pyo3(signature = (path, text=None, json=false, pressure_pa=None))]
+    fn new(
+        py: Python<'_>,
+        path: PathBuf,
+        text: Option<String>,
+        json: bool,
+        pressure_pa: Option<PyBuffer<f32>>,
+    ) -> PyResult<Self> {
+        let map_pa = pressure_pa.map(|map| map.to_vec(py)).transpose()?.map(Arc::new);
         let read = move || -> Result<Read, Problem> {
-            let scene = match text {
-                None => Read::read(&path)?,
-                Some(text) if json => Read::parse(&path, toml_of(&path, &text)?)?,
-                Some(text) => Read::parse(&path, text)?,
+            let text = match text {
+                None => papilla_json::read_text(&path)
+                    .map_err(|source| SceneError::Read { path: path.clone(), source })?,
+                Some(text) if json => toml_of(&path, &text)?,
+                Some(text) => text,
             };
-            Ok(scene)
+            Ok(Read::parse_under(&path, text, map_pa)?)
         };
         let scene = compute(py, read)?.map_err(|problem| problem.raise(py, 0))?;
         Ok(Self { scene: Arc::new(scene) })

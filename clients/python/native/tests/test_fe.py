@@ -73,6 +73,68 @@ def test_states_of_a_finger_are_those_of_the_command_to_the_bit(command, tmp_pat
     assert states[1].sed_j_per_m3.max() > 0 and states[1].pressure_pa.shape == (224, 224)
 
 
+def test_a_map_of_pressure_presses_as_the_indenter_that_it_came_of(command, tmp_path):
+    ball = fe.Scene(FINGER).run(fields=False)[-1]
+    np.savez(tmp_path / "map.npz", pressure_pa=np.stack([0 * ball.pressure_pa, ball.pressure_pa]))
+    head = FINGER[: FINGER.index("[indenter]")]
+    text = head + f'[pressure]\nfile = "{tmp_path}/map.npz"\nincrements = 2\n'
+    states = fe.Scene(text).run(fields=False)
+    given = fe.Scene(head + "[pressure]\nincrements = 2\n", pressure=ball.pressure_pa).run(fields=False)
+    out = command(text)
+    with np.load(out / "maps.npz") as maps:
+        for one, other in zip(states, given, strict=True):
+            assert one.sed_j_per_m3.tobytes() == other.sed_j_per_m3.tobytes()
+            assert one.sed_j_per_m3.tobytes() == maps["sed_dermis_j_per_m3"][one.number].tobytes()
+    # Half of the pressure, then all of it: as much force as the ball, and as the map's own integral.
+    half, whole = states
+    assert whole.force_n[2] == pytest.approx(ball.force_n[2], rel=0.02)
+    assert half.force_n[2] == pytest.approx(0.5 * whole.force_n[2], rel=0.05)
+    atlas = papilla.Finger().atlas()
+    normals = fe_normals(atlas)
+    integral = (ball.pressure_pa.ravel()[atlas.pixels] * atlas.areas_mm2 * normals).sum() * 1e-6
+    assert whole.force_n[2] == pytest.approx(integral, rel=0.1)
+    assert whole.summary["checks"]["energy_vs_work"] < 5e-3 and 0.3 < whole.depth_mm < 0.9
+    # The output shows the pressure that was given, to what the nodes of this coarse mesh hold of it.
+    error = np.linalg.norm(whole.pressure_pa - ball.pressure_pa) / np.linalg.norm(ball.pressure_pa)
+    assert error < 0.05
+
+
+def fe_normals(atlas):
+    """How far the outward normal of each pixel looks against z."""
+    corners = atlas.positions_mm[atlas.triangles[atlas.owners]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return -normal[:, 2] / np.linalg.norm(normal, axis=1)
+
+
+def test_a_map_that_cannot_press_is_said(tmp_path):
+    head = FINGER[: FINGER.index("[indenter]")] + "[pressure]\n"
+    press = np.zeros((224, 224))
+    press[95:115, 105:130] = 8e3
+    for values, words in [
+        (0 * press, "no pressure anywhere"),
+        (-press, "never pulled"),
+        (1e9 * press, "were Pa meant"),
+    ]:
+        with pytest.raises(papilla.BadScene, match=words):
+            fe.Scene(head, pressure=values).explain()
+    np.save(tmp_path / "small.npy", press[:8])
+    with pytest.raises(papilla.BadScene, match=r"shape \[8, 224\]"):
+        fe.Scene(head + f'file = "{tmp_path}/small.npy"\n').explain()
+    with pytest.raises(papilla.BadScene, match="No such file") as bad:
+        fe.Scene(head + 'file = "none.npy"\n').explain()
+    assert bad.value.field == "pressure.file" and bad.value.line == 8
+    with pytest.raises(papilla.BadScene, match="give one map"):
+        fe.Scene(head)
+    with pytest.raises(papilla.BadScene, match="leave motion out"):
+        fe.Scene(head + "[motion]\ndepth_mm = 1.0\n", pressure=press)
+    with pytest.raises(papilla.BadScene, match="give one of the two"):
+        fe.Scene(head + '[indenter]\nshape = "sphere"\nradius_mm = 5.0\n', pressure=press)
+    with pytest.raises(papilla.BadScene, match="atlas"):
+        fe.Scene({"geometry": BLOCK["geometry"]}, pressure=press)
+    with pytest.raises(papilla.BadInput, match="224"):
+        fe.Scene(head, pressure=press[:8])
+
+
 def test_fields_hang_together(tmp_path):
     state = fe.Scene(BLOCK).run()[-1]
     nodes, cells = state.nodes, state.cells

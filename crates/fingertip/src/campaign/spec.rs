@@ -216,6 +216,7 @@ impl CampaignSpec {
             materials: self.materials.clone(),
             indenter: candidate.indenter.clone(),
             motion: Motion::to_depth(1.0, 1, Pose::default()),
+            pressure: None,
             friction: self.friction,
             biphasic: Biphasic::default(),
             contact: None,

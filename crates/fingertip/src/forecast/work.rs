@@ -44,6 +44,8 @@ const FORCES_PER_HISTORY: f64 = 1.0;
 const FORCES_PER_STATE: f64 = 2.0;
 /// Equilibria tried for one prescribed force.
 const TRIES_PER_FORCE: f64 = 7.7;
+/// Equilibria on the way to the whole of a given pressure.
+const SHARES: f64 = 8.0;
 /// Equilibria between first touch and the first two stored depths.
 const EXTRA_DEPTHS: [usize; 2] = [5, 1];
 
@@ -83,6 +85,7 @@ fn equilibria(setup: &Simulation) -> f64 {
         Drive::Depths(depths) => {
             return (depths.len() + EXTRA_DEPTHS.iter().take(depths.len()).sum::<usize>()) as f64;
         }
+        Drive::Shares(shares) => return SHARES.max(shares.len() as f64),
         Drive::Path(points) => points,
     };
     let problem = &setup.body.problem;

@@ -2,7 +2,7 @@
 
 use crate::forecast::{Forecast, SedError, better};
 use crate::scene::effects::{EFFECTS, Effect};
-use crate::scene::{Geometry, Output, Plan, Scene};
+use crate::scene::{Geometry, Output, Plan, Pressure, Scene};
 use crate::simulation::Simulation;
 use crate::simulation::body::SimulationError;
 use crate::simulation::drive::Drive;
@@ -105,7 +105,10 @@ impl Explanation {
         Ok(Self {
             file: scene.origin.path().to_owned(),
             geometry: table(&scene.geometry, "kind"),
-            indenter: table(&scene.indenter, "shape"),
+            indenter: match &scene.pressure {
+                Some(pressure) => pressed(pressure),
+                None => table(&scene.indenter, "shape"),
+            },
             motion: motion(scene, &setup.drive),
             outputs: Output::ALL.into_iter().filter(|&o| scene.writes(o)).collect(),
             simulated: simulated.collect(),
@@ -205,9 +208,20 @@ fn table(table: &impl Serialize, kind: &str) -> String {
     text
 }
 
+/// What presses in place of an indenter.
+fn pressed(pressure: &Pressure) -> String {
+    match &pressure.file {
+        Some(file) => format!("none; pressure of {}", file.display()),
+        None => "none; pressure of a map that the program gave".into(),
+    }
+}
+
 fn motion(scene: &Scene, drive: &Drive) -> String {
     let m = &scene.motion;
     let states = drive.len();
+    if scene.pressure.is_some() {
+        return format!("none; {states} stored shares of the pressure");
+    }
     let to = match (m.depth_mm, m.force_n, &m.path) {
         (Some(depth), _, _) => format!("to {depth} mm"),
         (_, Some(force), _) => format!("to {force} N"),

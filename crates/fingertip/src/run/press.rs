@@ -32,8 +32,7 @@ pub fn press(
     let (mut way, mut way_before) = (Vec::new(), Vec::new());
     let keep =
         &mut |state: usize, s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
-            let surface = &body.problem.mesh.surfaces[&body.contact];
-            let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
+            let pressure_mpa_max = body.pressure_mpa(s).into_iter().fold(0.0, f64::max);
             let pressed = Pressed { record: record.clone(), report: *report, pressure_mpa_max };
             visit(state, s, &pressed);
             if state == 0 {

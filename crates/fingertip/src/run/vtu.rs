@@ -24,11 +24,10 @@ impl BodyFields {
     /// Of the body at the solver's equilibrium.
     #[must_use]
     pub fn new(body: &Body, solver: &Solver<'_>) -> Self {
-        let surface = &body.problem.mesh.surfaces[&body.contact];
         let pa = |values: Vec<f64>| values.into_iter().map(|p| p * PA_PER_MPA).collect();
         Self {
             displacement_mm: solver.displacement_mm().to_vec(),
-            pressure_pa: pa(solver.pressure_mpa(surface)),
+            pressure_pa: pa(body.pressure_mpa(solver)),
             fluid_pressure_pa: pa(solver.fluid_pressure_mpa()),
             elements: ElementFields::new(body, solver),
         }

@@ -49,6 +49,14 @@ pub enum SceneError {
         /// What it has to be.
         rule: &'static str,
     },
+    /// A map of pressure that cannot be read, or cannot press.
+    #[error("{field}: {message}")]
+    Pressure {
+        /// Field, dotted.
+        field: &'static str,
+        /// What is wrong, with the file.
+        message: String,
+    },
     /// An effect that the scene cannot have.
     #[error("effect '{effect}': {why}")]
     Effect {
@@ -92,7 +100,7 @@ impl SceneError {
     pub fn field(&self) -> Option<String> {
         match self {
             Self::Value { field, .. } => Some(field.clone()),
-            Self::Fields { field, .. } => Some((*field).into()),
+            Self::Fields { field, .. } | Self::Pressure { field, .. } => Some((*field).into()),
             Self::Effect { effect, .. } => Some(format!("effects[{effect}]")),
             Self::Material(e) => Some(material_field(e)),
             Self::Indenter(e) => Some(indenter_field(e)),

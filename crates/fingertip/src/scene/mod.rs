@@ -14,6 +14,7 @@ mod materials;
 mod motion;
 mod origin;
 mod outputs;
+mod pressure;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ pub use materials::{MaterialSet, TissueError, TissueTable};
 pub use motion::{Motion, PathPoint, Pose};
 pub use origin::{Located, Origin, Place};
 pub use outputs::Output;
+pub use pressure::Pressure;
 
 use crate::geometry::fingertip::FingertipShape;
 use crate::indenter::IndenterError;
@@ -37,6 +39,7 @@ use papilla_sdf::IndenterSpec;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A scene file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,7 +54,11 @@ pub struct Scene {
     #[serde(default)]
     pub indenter: IndenterSpec,
     /// How it moves.
+    #[serde(default, skip_serializing_if = "Motion::is_still")]
     pub motion: Motion,
+    /// Pressure on the skin in place of an indenter and its motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<Pressure>,
     /// Friction, for the effect of that name.
     #[serde(default)]
     pub friction: Friction,
@@ -113,6 +120,7 @@ impl Scene {
             materials: TissueTable::default(),
             indenter: IndenterSpec::default(),
             motion: Motion::to_depth(1.0, 1, Pose::default()),
+            pressure: None,
             friction: Friction::default(),
             biphasic: Biphasic::default(),
             contact: None,
@@ -138,6 +146,18 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] names the file and line, or the field and its rule.
     pub fn parse(path: &Path, text: String) -> Result<Self, SceneError> {
+        Self::parse_under(path, text, None)
+    }
+
+    /// The same, of a scene that is pressed by a map (224 x 224, Pa) which the program has.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn parse_under(
+        path: &Path,
+        text: String,
+        map_pa: Option<Arc<Vec<f32>>>,
+    ) -> Result<Self, SceneError> {
         let origin = Origin::new(path, text);
         if has_key(origin.text(), "presses") {
             let message = "is a campaign, not a scene: `fe-datagen explain` and `generate` take it";
@@ -147,6 +167,9 @@ impl Scene {
         let mut scene = parsed.map_err(|e| SceneError::parse(&origin, &e))?;
         scene.folder = path.parent().unwrap_or(Path::new("")).into();
         scene.origin = origin;
+        if map_pa.is_some() {
+            scene.pressure.get_or_insert_default().map_pa = map_pa;
+        }
         if let Err(e) = scene.take_finger() {
             return Err(e.at(&scene));
         }
@@ -190,7 +213,7 @@ impl Scene {
     /// [`SceneError`] for the first field that makes no sense.
     pub fn validate(&self) -> Result<(), SceneError> {
         self.geometry.validate()?;
-        self.motion.validate()?;
+        self.validate_pressure()?;
         self.indenter.validate().map_err(IndenterError::from)?;
         let c = self.friction.coefficient;
         require(

@@ -52,6 +52,13 @@ fn one() -> usize {
     1
 }
 
+impl Default for Motion {
+    /// None at all.
+    fn default() -> Self {
+        Self { depth_mm: None, ..Self::to_depth(0.0, one(), Pose::default()) }
+    }
+}
+
 /// A point of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

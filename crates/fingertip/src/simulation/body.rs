@@ -1,5 +1,6 @@
 //! A body pressed by a rigid plate: set-up, pose, and vertex values.
 
+use super::pressed::Under;
 use super::record::IncrementRecord;
 use crate::geometry::fingertip::FingertipShapeError;
 use crate::indenter::IndenterError;
@@ -20,6 +21,7 @@ use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::mesh::sample::Deformed;
 use papilla_fem::solve::{
     Materials, Options, Problem, ProblemError, SnapshotError, SolveError, Solver, StepReport,
+    SurfacePressureError,
 };
 use papilla_sdf::Placement;
 use papilla_solid::tensor::{norm, product};
@@ -69,6 +71,20 @@ pub enum SimulationError {
         /// Why.
         source: SolveError,
     },
+    /// No equilibrium under a given pressure.
+    #[error("at {share:.3} of the pressure: {source}")]
+    Share {
+        /// Share aimed at.
+        share: f64,
+        /// Why.
+        source: SolveError,
+    },
+    /// Pressure cannot act on the skin.
+    #[error(transparent)]
+    Pressure(SurfacePressureError),
+    /// The skin cannot be flattened, so that no map has a place on it.
+    #[error(transparent)]
+    Atlas(BuildAtlasError),
     /// Nodes slipped off an edge of the indenter.
     #[error(
         "at depth {depth_mm} mm: {:.0} % of the contact force acts along the skin, not into it: nodes \
@@ -173,6 +189,8 @@ pub struct Body {
     pub first_touch: Option<Contact>,
     /// Whether its cells are split under that contact.
     pub graded: bool,
+    /// The pressure that acts in place of an indenter.
+    pub under: Option<Under>,
     /// On which the way to each state is found first, if there is one.
     pub(super) guide: Option<Box<Guide>>,
 }
@@ -215,6 +233,7 @@ impl Body {
             plane,
             first_touch: None,
             graded: false,
+            under: None,
             guide: None,
         })
     }
@@ -250,6 +269,7 @@ impl Body {
             plane,
             first_touch: None,
             graded: false,
+            under: None,
             guide: None,
         })
     }
@@ -343,21 +363,14 @@ impl Body {
         let difference =
             |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
         let work = solver.indenter_work_mj();
-        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa, mut shear_mpa) =
-            Default::default();
+        let [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] =
+            self.at_vertices(solver, &pressure)?;
+        let mut shear_mpa = Vec::new();
         if let Some(p) = &self.patch {
-            let nodal = self.nodal_fields(solver, p, &pressure)?;
             shear_mpa = self.shear_mpa(solver, &p.patch.skin);
-            [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] = match &p.patch.vertices {
-                None => nodal,
-                Some(vertices) => {
-                    if !shear_mpa.is_empty() {
-                        shear_mpa = vertices.vector(&shear_mpa);
-                    }
-                    let [pressure, dermis, epidermis] = nodal;
-                    [vertices.pressure(&pressure), vertices.sed(&dermis), vertices.sed(&epidermis)]
-                }
-            };
+            if let (Some(vertices), false) = (&p.patch.vertices, shear_mpa.is_empty()) {
+                shear_mpa = vertices.vector(&shear_mpa);
+            }
         }
         Ok(IncrementRecord {
             depth_mm,
@@ -384,6 +397,23 @@ impl Body {
                 cg_iterations: report.effort.cg_iterations,
             },
             seconds: 0.0,
+        })
+    }
+
+    /// Pressure and SED on both sides of the interface at the vertices of the patch, of pressure at
+    /// the nodes of the mesh, all MPa; empty without a patch.
+    pub(super) fn at_vertices(
+        &self,
+        solver: &Solver<'_>,
+        pressure_mpa: &[f64],
+    ) -> Result<[Vec<f64>; 3], SimulationError> {
+        let Some(p) = &self.patch else { return Ok(Default::default()) };
+        let [pressure, dermis, epidermis] = self.nodal_fields(solver, p, pressure_mpa)?;
+        Ok(match &p.patch.vertices {
+            None => [pressure, dermis, epidermis],
+            Some(vertices) => {
+                [vertices.pressure(&pressure), vertices.sed(&dermis), vertices.sed(&epidermis)]
+            }
         })
     }
 

@@ -71,6 +71,8 @@ pub enum Drive {
     Depths(Vec<f64>),
     /// Straight, at these forces along the motion, N, rising.
     Forces(Vec<f64>),
+    /// Not moved by an indenter: at these shares of a given pressure, rising.
+    Shares(Vec<f64>),
     /// Along a path over time.
     Path(Vec<DrivePoint>),
 }
@@ -174,6 +176,9 @@ impl Body {
         visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
         drive.validate()?;
+        if let Drive::Shares(shares) = drive {
+            return self.to_shares(solver, shares, course.refinement, visit);
+        }
         let duration_s = match drive {
             Drive::Path(points) => points.last().map_or(0.0, |p| p.time_s),
             _ => 0.0,
@@ -190,6 +195,7 @@ impl Body {
                 self.to_depths(solver, guided, depths, course, visit)
             }
             Drive::Forces(forces) => self.to_forces(solver, forces, visit),
+            Drive::Shares(_) => Err(SimulationError::Empty),
             Drive::Path(points) => {
                 self.along(solver, points, (approach.friction, course.refinement), visit)
             }
@@ -351,7 +357,7 @@ impl Drive {
     #[must_use]
     pub fn len(&self) -> usize {
         match self {
-            Self::Depths(v) | Self::Forces(v) => v.len(),
+            Self::Depths(v) | Self::Forces(v) | Self::Shares(v) => v.len(),
             Self::Path(points) => points.len(),
         }
     }
@@ -370,7 +376,7 @@ impl Drive {
 
     fn validate(&self) -> Result<(), SimulationError> {
         let rising: Vec<f64> = match self {
-            Self::Depths(v) | Self::Forces(v) => v.clone(),
+            Self::Depths(v) | Self::Forces(v) | Self::Shares(v) => v.clone(),
             Self::Path(points) => points.iter().map(|p| p.time_s).collect(),
         };
         let mut last = 0.0;

@@ -62,7 +62,7 @@ impl Body {
     }
 
     /// Degrees of freedom of a fingertip that are held.
-    fn held(mesh: &Mesh, parts: Parts) -> Vec<bool> {
+    pub(super) fn held(mesh: &Mesh, parts: Parts) -> Vec<bool> {
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
         for &n in &mesh.node_sets["base"] {
             fixed[3 * n as usize] = true;

@@ -34,6 +34,7 @@ mod fluid;
 mod guide;
 pub mod laws;
 pub mod maps;
+pub mod pressed;
 pub mod record;
 pub mod sample;
 pub mod section;

@@ -6,7 +6,7 @@ use super::laws::solids;
 use super::section::SectionSpec;
 use crate::indenter::IndenterError;
 use crate::mesh::fingertip::Order;
-use crate::scene::{Geometry, Layer, Motion, Plan, Scene};
+use crate::scene::{Geometry, Layer, Motion, Plan, Pose, Pressure, Scene};
 use crate::tissue::Tissue;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::block::{BlockLattice, build as build_block, even};
@@ -46,6 +46,9 @@ impl Simulation {
 
     fn build(scene: &Scene) -> Result<Self, SimulationError> {
         let plan = scene.plan()?;
+        if let Some(pressure) = &scene.pressure {
+            return Self::under(scene, plan, pressure);
+        }
         let approach = Approach {
             shape: scene.indenter.build(&scene.folder).map_err(IndenterError::from)?,
             top_mm: scene.indenter.top_mm(),
@@ -59,6 +62,24 @@ impl Simulation {
         // An indenter that never touches is found now, not after files are written.
         body.indenter(&approach, &drive)?;
         Ok(Self { plan, body, approach, drive })
+    }
+}
+
+impl Simulation {
+    /// Of a scene that is pressed by a map.
+    fn under(scene: &Scene, plan: Plan, pressure: &Pressure) -> Result<Self, SimulationError> {
+        let map_pa = pressure.map_pa(&scene.folder)?;
+        let Geometry::Fingertip { density, order, shape, .. } = &scene.geometry else {
+            // Refused when the scene was read.
+            return Err(SimulationError::Empty);
+        };
+        let materials = solids(&scene.materials, &plan)?;
+        let mesh = (*density, *order, plan.parts);
+        let body = Body::fingertip_under(shape, materials, mesh, &map_pa)?;
+        let n = pressure.increments;
+        let shares = (1..=n).map(|i| i as f64 / n as f64).collect();
+        let approach = Approach::plate(Pose::default());
+        Ok(Self { plan, body, approach, drive: Drive::Shares(shares) })
     }
 }
 

@@ -29,6 +29,7 @@ impl Approach {
         match drive {
             Drive::Depths(depths) => depths_mm.clone_from(depths),
             Drive::Forces(_) => depths_mm.push(GRADED_DEPTH_MM),
+            Drive::Shares(_) => {}
             Drive::Path(points) => {
                 depths_mm.extend(points.iter().map(|p| p.depth_mm).filter(|d| *d > 0.0));
                 depths_mm.sort_by(f64::total_cmp);
@@ -76,6 +77,7 @@ impl Body {
         let path = match drive {
             Drive::Depths(depths) => straight(depths.last().copied().unwrap_or(0.0)),
             Drive::Forces(_) => straight(FORCE_TRAVEL_MAX_MM),
+            Drive::Shares(_) => straight(0.0),
             Drive::Path(points) => {
                 let end = points.last().map_or(1.0, |p| p.time_s);
                 points.iter().map(|p| (p.time_s / end, offset(p.depth_mm, p.shift_mm))).collect()

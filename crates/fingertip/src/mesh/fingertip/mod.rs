@@ -208,6 +208,23 @@ pub fn build(
     layered(shape, &density.resolution(order), order, parts, refined)
 }
 
+/// Meshes a fingertip in [`Order::Graded`] for a given pressure: `pressed` says of a point of the skin
+/// whether the pressure's edge passes there, or `None` where nothing presses.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_pressed(
+    shape: &FingertipShape,
+    density: Density,
+    parts: Parts,
+    pressed: &dyn Fn([f64; 3]) -> Option<bool>,
+) -> Result<FingertipMesh, FingertipShapeError> {
+    shape.validate()?;
+    let spacing = Spacing::of_pressure(shape, pressed, density.closeness());
+    let refined = Some(Refined::new(shape, Some(spacing)));
+    layered(shape, &density.resolution(Order::Graded), Order::Graded, parts, refined)
+}
+
 /// The mesh `fine`, of [`build`] in [`Order::Graded`], with cells as large as those of
 /// [`Density::Coarse`], and what reads its displacement at the nodes of `fine`; `None` where it
 /// would be that mesh, no contact splits cells, or a solid nail has nodes of its own.

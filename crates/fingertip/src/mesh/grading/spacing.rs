@@ -23,6 +23,9 @@ pub struct Closeness {
     pub growth: f64,
 }
 
+/// Radius of the ball whose pressure changes as fast as a given one away from its edges, mm.
+const BALL_MM: f64 = 5.0;
+
 /// Spacing that an indentation wants on the undeformed skin.
 #[derive(Clone, Debug)]
 pub struct Spacing {
@@ -52,6 +55,32 @@ impl Spacing {
     pub fn new(shape: &FingertipShape, contact: &Contact, closeness: Closeness) -> Self {
         let touched = contact.straight().flat_map(|straight| touched(shape, &straight)).collect();
         Self { touched, closeness }
+    }
+
+    /// For the skin that a given pressure presses: `pressed` says of a point of it whether the
+    /// pressure's edge passes there, or `None`. Nodes are as close as at a contact's edge there, in both
+    /// directions, and elsewhere as under a ball.
+    #[must_use]
+    pub fn of_pressure(
+        shape: &FingertipShape,
+        pressed: &dyn Fn([f64; 3]) -> Option<bool>,
+        closeness: Closeness,
+    ) -> Self {
+        let Closeness { of_radius_mm, edge_mm, .. } = closeness;
+        let of_edge = (of_radius_mm / edge_mm).powi(2);
+        let touch = |at| {
+            let curvature = if pressed(at)? { of_edge } else { 1.0 / BALL_MM };
+            let hessian = std::array::from_fn(|i| {
+                std::array::from_fn(|j| if i == j { curvature } else { 0.0 })
+            });
+            Some(Touched { at, hessian, across_edge: None })
+        };
+        // From below, and what the atlas shows of the sides beyond.
+        let sides = [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]];
+        let is_side = |at: &[f64; 3]| shape.skin_normal(*at)[2] > 0.05;
+        let beside = sides.into_iter().flat_map(|way| facing(shape, way)).filter(is_side);
+        let below = facing(shape, [0.0, 0.0, 1.0]);
+        Self { touched: below.chain(beside).filter_map(touch).collect(), closeness }
     }
 
     /// The same contact meshed more or less closely: where it touches is not looked for again.

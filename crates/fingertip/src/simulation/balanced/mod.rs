@@ -173,7 +173,7 @@ impl Body {
         let with = |rule| Approach { contact: Some(rule), ..approach.clone() };
         let mut way = approach.clone();
         let mut taken = ways.refined(&way, drive);
-        let straight = !matches!(drive, Drive::Path(_));
+        let straight = matches!(drive, Drive::Depths(_) | Drive::Forces(_));
         let slips = (straight && taken.loses_energy()) || taken.no_equilibrium;
         if slips && self.can_take_gauss_points(approach) {
             tracing::info!("nodes slip off the indenter: solved again with Gauss-point contact");
@@ -207,7 +207,7 @@ impl<T> Ways<'_, '_, T> {
     fn refined(&mut self, approach: &Approach, drive: &Drive) -> Taken<T> {
         let mut taken = self.once(approach, drive, 1);
         let (drive, finer) = match drive {
-            Drive::Depths(_) => (drive.clone(), REFINEMENTS[1..].to_vec()),
+            Drive::Depths(_) | Drive::Shares(_) => (drive.clone(), REFINEMENTS[1..].to_vec()),
             // A state at a force is the state at its depth.
             Drive::Forces(_) => (Drive::Depths(taken.depths_mm.clone()), REFINEMENTS.to_vec()),
             Drive::Path(_) => (drive.clone(), path_refinements(taken.excess)),
@@ -241,7 +241,7 @@ impl<T> Ways<'_, '_, T> {
         }
         let mut depths_mm: Vec<f64> = match drive {
             Drive::Depths(depths) => depths.iter().copied().take(kept.len()).collect(),
-            Drive::Forces(_) | Drive::Path(_) => Vec::new(),
+            Drive::Forces(_) | Drive::Shares(_) | Drive::Path(_) => Vec::new(),
         };
         let Self { body, solver, energy_vs_work_max, keep, behind, at_state, .. } = self;
         let course = Course {

@@ -1,0 +1,26 @@
+"""A pressure of your own: what finite elements and a network say of it, and which fibres fire: felt.npz."""
+
+import numpy as np
+
+import papilla
+from papilla import afferents, fe
+
+# In place of a map that a sensor measured: two bumps under the pad.
+atlas = papilla.Finger().atlas()
+bumps = [papilla.Contact(at_mm=(11.25, y_mm, -6.5), force_n=0.05) for y_mm in (-1.5, 1.5)]
+pressure_pa = atlas.contacts(bumps)
+
+# A coarse mesh, to be quick; leave density and order out for one on which SED is good.
+scene = {"geometry": {"kind": "fingertip", "density": "coarse", "order": "linear"}, "pressure": {"increments": 1}}
+state = fe.Scene(scene, pressure=pressure_pa).run(fields=False)[-1]
+network = papilla.Model("small").sed(pressure_pa)
+print(f"{state.force_n[2]:.3f} N, {state.depth_mm:.2f} mm deep, flags {state.flags}")
+print(f"SED at most {state.sed_j_per_m3.max():.0f} J/m3 by these elements, {network.max():.0f} J/m3 by the network")
+
+times_s = 0.02 * np.arange(10)
+share = np.minimum(times_s / 0.1, 1.0)[:, None, None]
+# Linear in pressure, SED goes with the square.
+trains = afferents.spikes(network * share**2, times_s, pressure_pa * share)
+print(f"{len(trains.unit)} spikes of {len(np.unique(trains.unit))} units")
+trains.save_npz("spikes.npz")
+np.savez("felt.npz", pressure_pa=pressure_pa, fe=state.sed_j_per_m3, network=network)
