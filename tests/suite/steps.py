@@ -222,7 +222,7 @@ def full() -> list[Step]:
             "Papilla's wheel for Python: in process as by the service, to the bit",
             f"{client} wheel",
             after=("build", "python"),
-            tests_min=30,
+            tests_min=60,
             installs="pip: maturin, numpy, websockets, pytest (40 MB)",
         ),
         Step("client-cpp", "the C++ client", f"{client} cpp", ("build", "packages"), 33),

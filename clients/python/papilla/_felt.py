@@ -47,7 +47,7 @@ class Feel:
     def step(self, sed_j_per_m3: ArrayLike, time_s: float = 0.0, *, pressure_pa: ArrayLike | None = None) -> Answer:
         """The answer to one map of SED (224, 224), J/m3, at a time that counts from 0.
 
-        `pressure_pa` is the pressure under which it came about, by which `spikes` of RA and PC units and the force of
+        `pressure_pa` is the pressure under which it came about, by which `spikes` of PC units and the force of
         `summary` go; without it there is none. What is remembered goes on from the call before.
         """
         sed = _map(sed_j_per_m3, "sed_j_per_m3")

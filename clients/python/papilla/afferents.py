@@ -45,7 +45,7 @@ def spikes(
 ) -> SpikeTrains:
     """When the touch units of a finger fire under a series of maps (n, 224, 224) of SED, J/m3.
 
-    `pressure_pa` are the maps of pressure; RA and PC units go by them, and without pressure they are silent.
+    `pressure_pa` are the maps of pressure; PC units go by their force, and without pressure they are silent.
     `parameters` are those of the effect `spikes`. Raises BadInput and Refused.
     """
     members = {} if parameters is None else {"spikes": dict(parameters)}

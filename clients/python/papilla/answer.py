@@ -130,8 +130,9 @@ class Answer:
     pressure_pa: Map | None = None
     """The pressure that was found, if asked for: a map, or a value a vertex."""
     shear_pa: Map | None = None
-    displacement_mm: Map | None = None
     """The traction along the skin, if asked for: x y z a vertex, in the finger's frame."""
+    displacement_mm: Map | None = None
+    """How far the skin has moved, if asked for: x y z a vertex, in the finger's frame."""
     vertices: Map | None = None
     """SED at the vertices, J/m3, if asked for in place of the map."""
     rates: Map | None = None

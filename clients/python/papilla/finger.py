@@ -61,6 +61,8 @@ class FingerContact:
     """A map (224, 224) or a value a vertex, as the finger was asked for."""
     shear_pa: Map | None = None
     """Traction along the skin, x y z a vertex, if the finger was asked for it."""
+    displacement_mm: Map | None = None
+    """How far the skin has moved, x y z a vertex, if the finger was asked for it."""
 
     @property
     def flags(self) -> tuple[str, ...] | list[tuple[str, ...]]:
@@ -92,10 +94,11 @@ class Finger:
         """Reads a finger's folder, by default that of the wheel's finger; of another Finger nothing is read again.
 
         `terms` are members of a session's hello: `method` (such as "pixels" or "second_order"; the most accurate
-        that can serve without), `pressure` ("map", the default, "vertices", or None), `shear`, `stiffness`; and
-        `finger`, a member of the hello's `fingers` ({"width": 1.1}). Raises BadInput, BadModels and NativeMissing.
+        that can serve without), `pressure` ("map", the default, "vertices", or None), `shear`, `displacement`,
+        `stiffness`; and `finger`, a member of the hello's `fingers` ({"width": 1.1}). Raises BadInput, BadModels and
+        NativeMissing.
         """
-        known = ("method", "pressure", "shear", "stiffness", "finger")
+        known = ("method", "pressure", "shear", "displacement", "stiffness", "finger")
         for name in terms:
             if name not in known:
                 raise BadInput(name, f"no such term of a finger; there are {', '.join(known)}")
@@ -282,6 +285,8 @@ class Finger:
                 values["pressure_pa"] = numbers.reshape(-1, SIDE_PX, SIDE_PX) if is_map else numbers
             elif name == "shear":
                 values["shear_pa"] = numbers.reshape(len(frames), -1, 3)
+            elif name == "displacement":
+                values["displacement_mm"] = numbers.reshape(len(frames), -1, 3)
         if not many:
             values = {name: array[0] for name, array in values.items()}
         return FingerContact(**values)

@@ -29,8 +29,8 @@ class Series:
 
     `values` has an array for each quantity, with the frame as first axis. What there is depends on the hello:
     `sed_j_per_m3`, `rates_hz`, `pressure_pa`, `shear_pa`, `displacement_mm`, `points_j_per_m3`,
-    `point_rates_hz`, `actuators`, the members of `Touch` and `Summary` as `touch_force_n`, `summary_sa1_rate_hz` and so on, and times in
-    the service. `series["sed_j_per_m3"]` is the same as `series.values["sed_j_per_m3"]`.
+    `point_rates_hz`, `actuators`, the members of `Touch` and `Summary` as `touch_force_n`, `summary_sa1_rate_hz` and
+    so on, and times in the service. `series["sed_j_per_m3"]` is the same as `series.values["sed_j_per_m3"]`.
     """
 
     def __init__(

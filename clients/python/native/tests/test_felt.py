@@ -44,9 +44,12 @@ def test_spikes_are_those_of_a_session_to_the_bit(felt):
     assert len(trains.unit) > 10 and trains.lost == there.lost
     assert np.array_equal(trains.unit, there.unit) and np.array_equal(trains.time_us, there.time_us)
     assert np.array_equal(trains.classes, there.classes) and np.array_equal(trains.px, there.px)
-    # Without pressure RA and PC units have nothing to go by.
-    silent = afferents.spikes(sed, TIMES_S)
-    assert set(silent.classes[silent.unit]) <= {"sa1"}
+    # PC units go by force; the others do not know of it.
+    assert (trains.classes[trains.unit] == "pc").any()
+    without = afferents.spikes(sed, TIMES_S)
+    assert not (without.classes[without.unit] == "pc").any()
+    others = trains.classes[trains.unit] != "pc"
+    assert np.array_equal(without.unit, trains.unit[others])
 
 
 def test_actuators_are_those_of_a_session_to_the_bit(felt):

@@ -30,7 +30,8 @@ def same_touch(contact, touch):
 @pytest.mark.parametrize(
     ("terms", "net"),
     [({}, None), ({"method": "second_order", "pressure": "vertices", "stiffness": True}, None),
-     ({"shear": True, "finger": {"width": 1.1, "stiffness": 0.8}}, None), ({}, ((0.0, 0.0, 1.0), 0.4))],
+     ({"shear": True, "displacement": True, "finger": {"width": 1.1, "stiffness": 0.8}}, None),
+     ({}, ((0.0, 0.0, 1.0), 0.4))],
     ids=["pixels", "vertices", "shear", "net"],
 )  # fmt: skip
 def test_touch_is_that_of_a_session_to_the_bit(base, terms, net):
@@ -49,6 +50,7 @@ def test_touch_is_that_of_a_session_to_the_bit(base, terms, net):
             assert np.array_equal(contact.pressure_pa, answer.pressure_pa)
             if "shear" in terms:
                 assert np.array_equal(contact.shear_pa, answer.shear_pa)
+                assert np.array_equal(contact.displacement_mm, answer.displacement_mm)
             assert ("no_contact" in contact.flags) == answer.no_contact
             assert ("unsettled" in contact.flags) == answer.unsettled
             assert ("cut_off" in contact.flags) == answer.cut_off
