@@ -45,7 +45,8 @@ def command(tmp_path_factory):
         (folder / "scene.toml").write_text(text)
         out = folder / "out"
         command = [program, "solve", folder / "scene.toml", "--out", out, "--json"]
-        subprocess.run(command, check=True, capture_output=True)
+        # 3: a check of a state failed, which is told of.
+        assert subprocess.run(command, capture_output=True, check=False).returncode in (0, 3)
         return out
 
     return solve

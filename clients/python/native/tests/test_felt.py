@@ -65,11 +65,15 @@ def test_actuators_are_those_of_a_session_to_the_bit(felt):
 def test_a_feel_goes_on_and_can_be_reset(felt):
     pressure_pa, sed, answers, _ = felt
     feel = afferents.Feel(effects=["afferents", "summary"])
-    first = [feel.step(*each, pressure_pa=press) for each, press in zip(zip(sed, TIMES_S), pressure_pa)]  # noqa: B905
+    first = feel.series(sed, TIMES_S, pressure_pa)
     assert [one.summary for one in first] == [one.summary for one in answers]
-    again = feel.step(sed[0], 2.0)
+    # One frame later the same map has a rate that goes by the frames before.
+    later = feel.step(sed[3], float(TIMES_S[-1]) + 0.01)
     feel.reset()
-    assert not np.array_equal(feel.step(sed[3], 2.0).rates_hz, again.rates_hz)
+    assert not np.array_equal(feel.step(sed[3], float(TIMES_S[-1]) + 0.01).rates_hz, later.rates_hz)
+    feel.reset()
+    again = [feel.step(one, float(time)) for one, time in zip(sed, TIMES_S, strict=True)]
+    assert [one.rates_hz.tobytes() for one in again] == [one.rates_hz.tobytes() for one in first]
 
 
 def test_what_cannot_be_felt_is_said(felt, tmp_path):
