@@ -387,6 +387,11 @@ def statement_table(all_answers, zones):
     spreads = np.flatnonzero(share >= SPREADS)
     blind = [truth[i][zone & ~reached(states[i].pressure_pa)].sum() / truth[i][zone].sum() for i in spreads]
     kept = [[one.found[i][zone].sum() / truth[i][zone].sum() for i in spreads] for one in judged]
+    unseen = [mask & ~reached(state.pressure_pa) for state in states]
+    beyond = [
+        np.median([map_[own].mean() for map_, own in zip(maps, unseen, strict=True) if own.any()])
+        for maps in (truth, *(one.found for one in judged))
+    ]
     return table(
         ("the paper's statement", "measured as", "FE", *(f"`{one.run.network}`" for one in judged)),
         (
@@ -420,6 +425,7 @@ def statement_table(all_answers, zones):
             percent(blind),
             *none,
         ),
+        ("", "mean SED there over the whole map, J/m3, median of all states", *(f"{value:.1f}" for value in beyond)),
     )
 
 
