@@ -349,12 +349,14 @@ def convergence_table(all_answers):
                 change(held_out),
             )
         )
-    heads = ("network", "split", "epochs", "steps of Adam", "training loss", "its change in the last epoch")
-    return table((*heads, "loss of the states for testing", "its change in the last epoch"), *rows)
+    heads = ("network", "split", "epochs", "steps of Adam", "training loss", "its change an epoch")
+    return table((*heads, "loss of the states for testing", "its change an epoch"), *rows)
 
 
-def change(losses):
-    return f"{100 * (losses[-1] / losses[-2] - 1):+.0f} %" if len(losses) > 1 else ""
+def change(losses, epochs=3):
+    """Mean change of an epoch over the last ones: from one to the next a loss goes up and down."""
+    epochs = min(epochs, len(losses) - 1)
+    return f"{100 * ((losses[-1] / losses[-1 - epochs]) ** (1 / epochs) - 1):+.0f} %" if epochs else ""
 
 
 def reached(pressure_pa):
