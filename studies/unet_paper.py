@@ -427,7 +427,11 @@ def statement_table(all_answers, zones):
             percent(blind),
             *none,
         ),
-        ("", "mean SED there over the whole map, J/m3, median of all states", *(f"{value:.1f}" for value in beyond)),
+        (
+            "",
+            "mean SED wherever the U-Net sees no pressure, J/m3, median of all states",
+            *(f"{value:.1f}" for value in beyond),
+        ),
     )
 
 
