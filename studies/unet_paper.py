@@ -110,7 +110,7 @@ def epochs_within(run, whole, seconds):
         if step == 2:  # the first steps build what the others reuse
             samples, began = 0, time.process_time()
         chosen = torch.arange(config.batch) + config.batch * step
-        inputs, targets = trainer.fit_samples.batch(chosen)
+        inputs, targets = trainer.fit_samples.batch(chosen % len(trainer.fit_samples))
         trainer.loss(trainer.network(inputs.contiguous(memory_format=torch.channels_last)), targets).backward()
         trainer.optimizer.step()
         samples += config.batch
