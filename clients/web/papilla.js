@@ -8,4 +8,4 @@ export { Foundation } from './src/foundation.js';
 export { DRAWN_TURN, JOINTS, feltInWorld, fingerOfJoints, placeOf, poseInFinger, vertexDrawn, vertexMm } from './src/frames.js';
 export { Hand } from './src/hand.js';
 export { Session } from './src/session.js';
-export { Answer, MAP_LEN, NotCarriedError, SIDE_PX, SUMMARY } from './src/wire.js';
+export { Answer, ERROR_ESTIMATE, MAP_LEN, NotCarriedError, SIDE_PX, SUMMARY } from './src/wire.js';

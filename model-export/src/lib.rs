@@ -23,6 +23,7 @@
 //! assert!((metrics.total_energy_error - 0.025).abs() < 1e-12);
 //! ```
 
+pub mod calibrate;
 pub mod contact;
 pub mod dataset;
 mod error;

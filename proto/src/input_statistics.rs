@@ -80,6 +80,26 @@ impl PressedCells {
         strange.count() as f32 / self.count().max(1) as f32
     }
 
+    /// How deep inside `known` all pressed cells lie: so many cells, at least, are between them and
+    /// the next cell that is not of `known`, sideways or along; 0 also where one is outside.
+    #[must_use]
+    pub fn depth_in(self, known: Self) -> u32 {
+        let (mut inside, mut depth) = (known.inner(), 0);
+        while self.count() > 0 && self.share_beyond(inside) <= 0.0 {
+            (inside, depth) = (inside.inner(), depth + 1);
+        }
+        depth
+    }
+
+    /// Those whose four neighbours are pressed too; what lies off the map is not.
+    fn inner(self) -> Self {
+        let at = |row: Option<usize>| row.and_then(|row| self.0.get(row)).copied().unwrap_or(0);
+        Self(std::array::from_fn(|row| {
+            let along = at(row.checked_sub(1)) & at(row.checked_add(1));
+            self.0[row] & (self.0[row] << 1) & (self.0[row] >> 1) & along
+        }))
+    }
+
     /// How many are pressed.
     #[must_use]
     pub fn count(self) -> u32 {
@@ -147,52 +167,7 @@ impl InputStatistics {
     /// cannot hold are as none.
     #[must_use]
     pub fn of(map_pa: &[f32]) -> Self {
-        // Lanes of f32 along a row, f64 over the rows: in vectors, and exact enough for 1e-4.
-        let (mut steps, mut inner, mut squares, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
-        let mut loads = [[0.0_f32; CELLS]; CELLS];
-        let mut columns = [0.0_f32; MAP_SIDE_PX];
-        let rows = map_pa.as_chunks::<MAP_SIDE_PX>().0;
-        for (y, row) in rows.iter().enumerate() {
-            let below = rows.get(y + 1).unwrap_or(row);
-            // The last pixel has no neighbour to its right: it is its own.
-            let mut right = *row;
-            right.copy_within(1.., 0);
-            right[MAP_SIDE_PX - 1] = row[MAP_SIDE_PX - 1];
-            columns.iter_mut().zip(row).for_each(|(sum, p)| *sum += p);
-            if y % CELL_PX == CELL_PX - 1 {
-                for (load, columns) in loads[y / CELL_PX].iter_mut().zip(columns.chunks(CELL_PX)) {
-                    *load = columns.iter().sum();
-                }
-                columns.fill(0.0);
-            }
-            let mut lanes = [[0.0_f32; LANES]; 4];
-            let [row, below, right] = [row, below, &right].map(|row| row.as_chunks::<LANES>().0);
-            for ((p, below), right) in row.iter().zip(below).zip(right) {
-                for i in 0..LANES {
-                    let (down, across) = (below[i] - p[i], right[i] - p[i]);
-                    let (down, across) = (down * down, across * across);
-                    lanes[0][i] += down + across;
-                    lanes[1][i] += p[i] * p[i];
-                    lanes[2][i] += p[i];
-                    let down = if below[i] > 0.0 { down } else { 0.0 };
-                    let across = if right[i] > 0.0 { across } else { 0.0 };
-                    lanes[3][i] += if p[i] > 0.0 { down + across } else { 0.0 };
-                }
-            }
-            let [a, b, c, d] = lanes.map(|lanes| f64::from(lanes.iter().sum::<f32>()));
-            (steps, squares, sum, inner) = (steps + a, squares + b, sum + c, inner + d);
-        }
-        let over = |part: f64| if squares > 0.0 { part / squares } else { 0.0 };
-        let (roughness, area_px) = (0.25 * over(steps), over(sum * sum));
-        let load_mpa_px = 1e-6 * sum;
-        Self {
-            roughness: roughness as f32,
-            load_mpa_px: load_mpa_px as f32,
-            rough_load_mpa_px: (roughness * load_mpa_px) as f32,
-            area_px: area_px as f32,
-            contrast_px: (0.25 * over(inner) * area_px) as f32,
-            cells: PressedCells::of_loads(&loads),
-        }
+        Look::of(map_pa).statistics
     }
 
     /// The greater of each, and every cell that is pressed in one of them.
@@ -218,6 +193,130 @@ impl InputStatistics {
             || self.area_px > AREA_HEADROOM * trained.area_px
             || self.contrast_px > CONTRAST_HEADROOM * trained.contrast_px
             || self.cells.share_beyond(trained.cells) > STRANGE_CELLS_MAX
+    }
+}
+
+/// What one pass over a pressure map tells: its statistics, and where and how widely it presses.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Look {
+    /// Statistics.
+    pub statistics: InputStatistics,
+    /// Column and row of the centre of pressure, px; the middle of a map without pressure.
+    pub centre_px: [f32; 2],
+    /// Standard deviations of the pressure's places along and across the longest way of the contact,
+    /// px; 0 without pressure.
+    pub spread_px: [f32; 2],
+}
+
+/// Sums of what lies along one side of the map, for its mean place and variance.
+#[derive(Debug, Clone, Copy, Default)]
+struct Along {
+    sum: f64,
+    first: f64,
+    second: f64,
+}
+
+impl Along {
+    fn add(&mut self, at: usize, load: f64) {
+        let from_middle = at as f64 - MIDDLE_PX;
+        self.sum += load;
+        self.first += load * from_middle;
+        self.second += load * from_middle * from_middle;
+    }
+
+    /// From the middle of the map, px; 0 without a load.
+    fn mean(&self) -> f64 {
+        if self.sum > 0.0 { self.first / self.sum } else { 0.0 }
+    }
+
+    fn variance(&self) -> f64 {
+        let mean = self.mean();
+        if self.sum > 0.0 { (self.second / self.sum - mean * mean).max(0.0) } else { 0.0 }
+    }
+}
+
+/// Of the pixels' numbers.
+const MIDDLE_PX: f64 = (MAP_SIDE_PX - 1) as f64 / 2.0;
+
+impl Look {
+    /// Looks at a map as [`InputStatistics::of`] does, in the same pass.
+    #[must_use]
+    pub fn of(map_pa: &[f32]) -> Self {
+        // Lanes of f32 along a row, f64 over the rows: in vectors, and exact enough for 1e-4.
+        let (mut steps, mut inner, mut squares, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+        let mut loads = [[0.0_f32; CELLS]; CELLS];
+        let mut columns = [0.0_f32; MAP_SIDE_PX];
+        let mut totals = [0.0_f32; MAP_SIDE_PX];
+        let (mut along_rows, mut along_columns) = (Along::default(), Along::default());
+        let rows = map_pa.as_chunks::<MAP_SIDE_PX>().0;
+        for (y, row) in rows.iter().enumerate() {
+            let below = rows.get(y + 1).unwrap_or(row);
+            // The last pixel has no neighbour to its right: it is its own.
+            let mut right = *row;
+            right.copy_within(1.., 0);
+            right[MAP_SIDE_PX - 1] = row[MAP_SIDE_PX - 1];
+            columns.iter_mut().zip(row).for_each(|(sum, p)| *sum += p);
+            if y % CELL_PX == CELL_PX - 1 {
+                let row_of_cells = &mut loads[y / CELL_PX];
+                for (load, columns) in row_of_cells.iter_mut().zip(columns.chunks(CELL_PX)) {
+                    *load = columns.iter().sum();
+                }
+                totals.iter_mut().zip(&columns).for_each(|(total, sum)| *total += sum);
+                columns.fill(0.0);
+            }
+            let mut lanes = [[0.0_f32; LANES]; 4];
+            let [row, below, right] = [row, below, &right].map(|row| row.as_chunks::<LANES>().0);
+            for ((p, below), right) in row.iter().zip(below).zip(right) {
+                for i in 0..LANES {
+                    let (down, across) = (below[i] - p[i], right[i] - p[i]);
+                    let (down, across) = (down * down, across * across);
+                    lanes[0][i] += down + across;
+                    lanes[1][i] += p[i] * p[i];
+                    lanes[2][i] += p[i];
+                    let down = if below[i] > 0.0 { down } else { 0.0 };
+                    let across = if right[i] > 0.0 { across } else { 0.0 };
+                    lanes[3][i] += if p[i] > 0.0 { down + across } else { 0.0 };
+                }
+            }
+            let [a, b, c, d] = lanes.map(|lanes| f64::from(lanes.iter().sum::<f32>()));
+            along_rows.add(y, c);
+            (steps, squares, sum, inner) = (steps + a, squares + b, sum + c, inner + d);
+        }
+        totals.iter().enumerate().for_each(|(x, total)| along_columns.add(x, f64::from(*total)));
+        let over = |part: f64| if squares > 0.0 { part / squares } else { 0.0 };
+        let (roughness, area_px) = (0.25 * over(steps), over(sum * sum));
+        let load_mpa_px = 1e-6 * sum;
+        let statistics = InputStatistics {
+            roughness: roughness as f32,
+            load_mpa_px: load_mpa_px as f32,
+            rough_load_mpa_px: (roughness * load_mpa_px) as f32,
+            area_px: area_px as f32,
+            contrast_px: (0.25 * over(inner) * area_px) as f32,
+            cells: PressedCells::of_loads(&loads),
+        };
+        Self { statistics, ..Self::placed(along_columns, along_rows, &loads) }
+    }
+
+    /// Centre and spread of what lies along the columns and the rows; how the two go together is
+    /// told by the cells.
+    fn placed(columns: Along, rows: Along, loads: &[[f32; CELLS]; CELLS]) -> Self {
+        let [x, y] = [columns, rows].map(|along| along.mean());
+        let mut together = 0.0;
+        let place =
+            |cell: usize| (CELL_PX * cell) as f64 + (CELL_PX as f64 - 1.0) / 2.0 - MIDDLE_PX;
+        for (row, loads) in loads.iter().enumerate() {
+            let along: f64 =
+                loads.iter().enumerate().map(|(i, load)| f64::from(*load) * (place(i) - x)).sum();
+            together += along * (place(row) - y);
+        }
+        let together = if rows.sum > 0.0 { together / rows.sum } else { 0.0 };
+        let [xx, yy] = [columns, rows].map(|along| along.variance());
+        let (mean, apart) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(together));
+        Self {
+            centre_px: [x + MIDDLE_PX, y + MIDDLE_PX].map(|at| at as f32),
+            spread_px: [mean + apart, mean - apart].map(|of| of.max(0.0).sqrt() as f32),
+            ..Self::default()
+        }
     }
 }
 
@@ -372,6 +471,57 @@ mod tests {
         let trained: InputStatistics =
             serde_json::from_str(r#"{"roughness": 0.5, "load_mpa_px": 50.0}"#).unwrap();
         assert!(!statistics([0.5, 50.0, 25.0, 5e4]).is_out_of_distribution(trained));
+    }
+
+    /// A bar of 60 x 12 px, turned by a third of a right angle: evenly spread, a side has a standard
+    /// deviation of its length over the root of 12.
+    #[test]
+    fn a_look_finds_the_centre_and_the_sides_of_a_bar() {
+        let bar = |degrees: f32, [x0, y0]: [f32; 2]| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            drawn(move |y, x| {
+                let (x, y) = (x as f32 - x0, y as f32 - y0);
+                let (along, across) = (x * cos + y * sin, y * cos - x * sin);
+                if along.abs() < 30.0 && across.abs() < 6.0 { 2e4 } else { 0.0 }
+            })
+        };
+        for (degrees, centre) in
+            [(0.0, [110.0, 120.0]), (30.0, [110.3, 120.2]), (90.0, [60.0, 80.0])]
+        {
+            let look = Look::of(&bar(degrees, centre));
+            for (found, due) in look.centre_px.into_iter().zip(centre) {
+                assert!((found - due).abs() < 0.5, "{look:?} at {degrees} degrees");
+            }
+            for (found, side) in look.spread_px.into_iter().zip([60.0_f32, 12.0]) {
+                let due = side / 12.0_f32.sqrt();
+                assert!((found / due - 1.0).abs() < 0.05, "{look:?} at {degrees} degrees");
+            }
+            assert_eq!(look.statistics, InputStatistics::of(&bar(degrees, centre)));
+        }
+        let nothing = Look::of(&drawn(|_, _| 0.0));
+        assert_eq!(nothing.spread_px.map(f32::to_bits), [0; 2]);
+    }
+
+    #[test]
+    fn how_deep_cells_lie_in_others_is_counted_in_cells() {
+        let cells = |rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
+            let map = drawn(|y, x| {
+                f32::from(rows.contains(&(y / CELL_PX)) && columns.contains(&(x / CELL_PX)))
+            });
+            InputStatistics::of(&map).cells
+        };
+        let known = cells(5..15, 5..15);
+        for (pressed, depth) in [
+            (cells(5..6, 8..9), 0),
+            (cells(8..9, 8..9), 3),
+            (cells(9..11, 9..11), 4),
+            (cells(8..9, 12..16), 0),
+            (cells(20..21, 20..21), 0),
+        ] {
+            assert_eq!(pressed.depth_in(known), depth);
+        }
+        assert_eq!(PressedCells::default().depth_in(known), 0);
+        assert_eq!(cells(13..15, 13..15).depth_in(PressedCells::EVERYWHERE), 13);
     }
 
     proptest! {

@@ -41,6 +41,7 @@
 pub mod contact;
 pub mod effects;
 pub mod error;
+pub mod error_estimate;
 pub mod finite;
 pub mod frame;
 pub mod input_statistics;
@@ -62,8 +63,9 @@ pub use papilla_sdf as sdf;
 
 pub use effects::RuntimeEffect;
 pub use error::{ErrorCode, Problem};
+pub use error_estimate::{ERROR_ESTIMATE_LEN, ErrorEstimate, LikelyError};
 pub use frame::{FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, flags};
-pub use input_statistics::InputStatistics;
+pub use input_statistics::{InputStatistics, Look};
 pub use map::{
     MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
     keep_inside, peak,

@@ -226,6 +226,34 @@ pub fn peak(map: &[f32]) -> f32 {
     greatest(peaks)
 }
 
+/// The greatest value of a map and the sum of all.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PeakAndSum {
+    /// The greatest.
+    pub peak: f32,
+    /// The sum, exact to 1e-5.
+    pub sum: f32,
+}
+
+impl PeakAndSum {
+    /// Of a map, 224 x 224, of which no value is negative or NaN, in one pass.
+    #[must_use]
+    pub fn of(map: &[f32]) -> Self {
+        let (mut peaks, mut sum) = ([0.0_f32; LANES], 0.0_f64);
+        for row in map.chunks(MAP_SIDE_PX) {
+            let mut sums = [0.0_f32; LANES];
+            for lanes in row.as_chunks::<LANES>().0 {
+                for ((peak, sum), &value) in peaks.iter_mut().zip(&mut sums).zip(lanes) {
+                    *peak = if value > *peak { value } else { *peak };
+                    *sum += value;
+                }
+            }
+            sum += f64::from(sums.iter().sum::<f32>());
+        }
+        Self { peak: greatest(peaks), sum: sum as f32 }
+    }
+}
+
 fn greatest(peaks: [f32; LANES]) -> f32 {
     peaks.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak })
 }
@@ -264,6 +292,15 @@ mod tests {
         assert!(check_pressure(&map, 1.0).unwrap().is_zero());
         map[MAP_LEN - 1] = f32::MIN_POSITIVE;
         assert!(!check_pressure(&map, 1.0).unwrap().is_zero());
+    }
+
+    #[test]
+    fn a_peak_and_a_sum_are_found_in_one_pass() {
+        let map: Vec<f32> = (0..MAP_LEN).map(|i| (i * 7919 % 1009) as f32).collect();
+        let found = PeakAndSum::of(&map);
+        let sum: f64 = map.iter().map(|v| f64::from(*v)).sum();
+        assert_eq!(found.peak.to_bits(), peak(&map).to_bits());
+        assert!((f64::from(found.sum) / sum - 1.0).abs() < 1e-6, "{found:?}, {sum} is due");
     }
 
     #[test]

@@ -159,6 +159,7 @@ fn contact() -> impl Strategy<Value = Hello> {
             fingers,
             method,
             force_target: asked.0,
+            error_estimate: asked.1,
             stiffness: asked.1,
             shear: asked.2,
             displacement: asked.2.map(|on| !on),

@@ -127,6 +127,15 @@ typedef struct PapillaSummary {
   float sed_u_px, sed_v_px, sed_uu_px2, sed_uv_px2, sed_vv_px2, sed_mean_j_per_m3, sa1_rate_hz;
 } PapillaSummary;
 
+/* How wrong an answer is likely to be, by what it shows: relative errors against finite elements.
+ * What is not stated is infinite. */
+typedef struct PapillaErrorEstimate {
+  float sed_median;   /* half of such maps err less (relative L2) */
+  float sed_p90;      /* nine of ten such maps err less */
+  float force_median; /* the same of the size of the force that contact found */
+  float force_p90;
+} PapillaErrorEstimate;
+
 /* What a frame came to; what the hello did not ask for is NULL or empty. */
 typedef struct PapillaAnswer {
   uint32_t flags;
@@ -141,6 +150,7 @@ typedef struct PapillaAnswer {
   PapillaSamples actuators;
   const PapillaSummary *summary;
   const PapillaTouch *touch;   /* to poses and gaps */
+  const PapillaErrorEstimate *error_estimate;
 } PapillaAnswer;
 
 uint32_t papilla_abi(void);

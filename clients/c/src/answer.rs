@@ -32,6 +32,8 @@ pub struct Answer<'a> {
     pub summary: &'a [f32],
     /// Sixteen numbers: [`papilla_proto::contact::Touch`].
     pub touch: &'a [f32],
+    /// Four numbers: [`papilla_proto::ErrorEstimate`].
+    pub error_estimate: &'a [f32],
 }
 
 impl Answer<'_> {
@@ -49,6 +51,7 @@ impl Answer<'_> {
         actuators: &[],
         summary: &[],
         touch: &[],
+        error_estimate: &[],
     };
 }
 
@@ -83,6 +86,7 @@ impl Layout {
                 SectionName::Map => &mut answer.map,
                 SectionName::Vertices => &mut answer.vertices,
                 SectionName::Touch => &mut answer.touch,
+                SectionName::ErrorEstimate => &mut answer.error_estimate,
                 SectionName::Pressure => &mut answer.pressure_pa,
                 // No hello gets this far with them.
                 SectionName::Spikes | SectionName::Shear | SectionName::Displacement => continue,

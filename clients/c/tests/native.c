@@ -15,7 +15,7 @@
 
 #include <papilla_c.h>
 
-_Static_assert(sizeof(void *) != 8 || sizeof(PapillaAnswer) == 152, "PapillaAnswer");
+_Static_assert(sizeof(void *) != 8 || sizeof(PapillaAnswer) == 160, "PapillaAnswer");
 _Static_assert(sizeof(void *) != 8 || offsetof(PapillaAnswer, map) == 24, "PapillaAnswer.map");
 _Static_assert(sizeof(void *) != 8 || sizeof(PapillaModelInfo) == 80, "PapillaModelInfo");
 _Static_assert(sizeof(void *) != 8 || offsetof(PapillaModelInfo, triangles) == 40, "PapillaModelInfo.triangles");

@@ -68,6 +68,7 @@ __all__ = [
     "BadScene",
     "Closed",
     "Contact",
+    "ErrorEstimate",
     "Finger",
     "FingerContact",
     "FrameFailed",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -57,6 +58,21 @@ def read_touch(message: wire.Message, offset: int) -> Touch:
     """The touch at `offset`."""
     v = struct.unpack_from("<16f", message, offset)
     return Touch((v[0], v[1], v[2]), (v[3], v[4], v[5]), v[6], (v[7], v[8], v[9]), *v[10:])
+
+
+class ErrorEstimate(NamedTuple):
+    """How wrong an answer is likely to be, relative to finite elements; what is not stated is infinite."""
+
+    sed_median: float = math.inf
+    """Half of such maps of SED err less (relative L2)."""
+    sed_p90: float = math.inf
+    """Nine of ten such maps err less."""
+    force_median: float = math.inf
+    """The same of the size of the force that contact found."""
+    force_p90: float = math.inf
+
+
+NOT_STATED = ErrorEstimate()
 
 
 class Spikes(NamedTuple):
@@ -123,6 +139,8 @@ class Answer:
     """Time in the server, of which `queue_us` waiting for a thread and `infer_us` in the network."""
     queue_us: int = 0
     infer_us: int = 0
+    error_estimate: ErrorEstimate = NOT_STATED
+    """How wrong this answer is likely to be, by what it shows."""
     values: Map | None = None
     """SED of the window, J/m3: (height, width)."""
     touch: Touch | None = None
@@ -217,6 +235,8 @@ def read(message: wire.Message, header: wire.Header, ready: dict[str, Any], tier
             answer.shear_pa = wire.floats(message, offset, size).reshape(-1, 3)
         elif name == "displacement":
             answer.displacement_mm = wire.floats(message, offset, size).reshape(-1, 3)
+        elif name == "error_estimate":
+            answer.error_estimate = ErrorEstimate(*struct.unpack_from("<4f", message, offset))
         elif name == "vertices":
             answer.vertices = wire.scaled(message, offset, ready["vertices"], header.sample_type, header.scale)
         elif name == "summary":

@@ -1,7 +1,7 @@
 //! What becomes of a frame.
 
 use papilla_proto::{
-    FrameHeader, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary, Window,
+    ErrorEstimate, FrameHeader, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary, Window,
     contact::Touch,
     effects::{RATES_HEAD_LEN, SectionName},
     flags,
@@ -67,6 +67,8 @@ pub struct Answer {
     pub window: Window,
     /// SED, J/m3: the whole map, 224 x 224, row-major; empty if the session asked for none.
     pub map: Vec<f32>,
+    /// How wrong this answer is likely to be, by what it shows; what is not stated is infinite.
+    pub error_estimate: ErrorEstimate,
     /// What pushes back, of objects and gaps.
     pub touch: Option<Touch>,
     /// The pressure that was found, Pa, if asked for.
@@ -155,6 +157,7 @@ impl Answer {
             infer_us: 0,
             window: Window::EMPTY,
             map: Vec::new(),
+            error_estimate: ErrorEstimate::default(),
             touch: None,
             pressure_pa: Vec::new(),
             shear_pa: Vec::new(),
@@ -231,6 +234,9 @@ impl Answer {
                 }
                 SectionName::Displacement => {
                     self.displacement_mm = floats(part)?.as_chunks::<3>().0.to_vec();
+                }
+                SectionName::ErrorEstimate => {
+                    self.error_estimate = ErrorEstimate::decode(part).ok_or_else(short)?;
                 }
                 SectionName::Vertices => {
                     self.vertices = vec![0.0; part.len() / header.sample_type.bytes()];

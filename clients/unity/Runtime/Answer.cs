@@ -8,6 +8,25 @@ namespace Papilla
         internal NotCarriedException(string what, string why) : base("the answer carries no " + what + ": " + why) { }
     }
 
+    /// <summary>
+    /// How wrong an answer is likely to be, by what it shows: relative errors against finite elements. Half of such
+    /// answers err less than the median, nine of ten less than P90. What is not stated is infinite.
+    /// </summary>
+    public struct ErrorEstimate
+    {
+        /// <summary>Of the map of SED (relative L2).</summary>
+        public float SedMedian, SedP90;
+        /// <summary>Of the size of the force that contact found.</summary>
+        public float ForceMedian, ForceP90;
+
+        /// <summary>Nothing is stated.</summary>
+        public static readonly ErrorEstimate Unknown = new ErrorEstimate
+        {
+            SedMedian = float.PositiveInfinity, SedP90 = float.PositiveInfinity,
+            ForceMedian = float.PositiveInfinity, ForceP90 = float.PositiveInfinity,
+        };
+    }
+
     /// <summary>A unit fired: its number in ready's <c>units</c>, and when, by the client's clock.</summary>
     public struct Spike
     {
@@ -46,6 +65,8 @@ namespace Papilla
         public bool NotTracked;
         /// <summary>The client's clock ticks so coarsely that rates and spikes may be far off.</summary>
         public bool CoarseClock;
+        /// <summary>How wrong this answer is likely to be.</summary>
+        public ErrorEstimate ErrorEstimate = ErrorEstimate.Unknown;
         /// <summary>What pushes back: of poses and of gaps.</summary>
         public Touch Touch;
         public bool HasTouch;
@@ -149,6 +170,9 @@ namespace Papilla
             int touchEnd = HasTouch ? terms.TouchAt + sizeof(Touch) : 0;
             if (touchEnd > bytes || terms.VerticesAt + terms.VerticesBytes > bytes) throw Short(bytes);
             if (HasTouch) Touch = *(Touch*)(m + terms.TouchAt);
+            bool isEstimated = terms.ErrorEstimateAt >= 0;
+            if (isEstimated && terms.ErrorEstimateAt + sizeof(ErrorEstimate) > bytes) throw Short(bytes);
+            ErrorEstimate = isEstimated ? *(ErrorEstimate*)(m + terms.ErrorEstimateAt) : ErrorEstimate.Unknown;
             PressurePa = Sized(PressurePa, terms.PressureCount);
             Copy(m, terms.PressureAt, terms.PressureCount, bytes, PressurePa);
             ShearPa = Sized(ShearPa, terms.ShearCount);

@@ -73,7 +73,7 @@ namespace Papilla
         public readonly float PressureMaxPa;
         /// <summary>All members, as on the wire.</summary>
         public readonly JObject Json;
-        internal readonly int TouchAt = -1, PressureAt = -1, PressureCount, ShearAt = -1, ShearCount, SpikesAt = -1, SpikesBytes, VerticesAt = -1, VerticesBytes, RatesAt = -1, RatesBytes;
+        internal readonly int ErrorEstimateAt = -1, TouchAt = -1, PressureAt = -1, PressureCount, ShearAt = -1, ShearCount, SpikesAt = -1, SpikesBytes, VerticesAt = -1, VerticesBytes, RatesAt = -1, RatesBytes;
         internal readonly int SummaryAt = -1, PointsAt = -1, PointsCount, PointRatesAt = -1, PointRatesCount, ActuatorsAt = -1, ActuatorsCount, MapAt = -1;
 
         internal Ready(JObject json)
@@ -93,6 +93,7 @@ namespace Papilla
                     case "touch": TouchAt = at; break;
                     case "pressure": PressureAt = at; PressureCount = bytes / 4; break;
                     case "shear": ShearAt = at; ShearCount = bytes / 4; break;
+                    case "error_estimate": ErrorEstimateAt = at; break;
                     case "spikes": SpikesAt = at; SpikesBytes = bytes; break;
                     case "vertices": VerticesAt = at; VerticesBytes = bytes; break;
                     case "summary": SummaryAt = at; break;

@@ -11,6 +11,8 @@ namespace Papilla
         /// <summary>The pixels of <see cref="Map"/>; nothing (0 x 0) where no map was asked for.</summary>
         public int Column, Row, Width, Height;
         public bool HasSed, OutOfRange, NoContact, Unfamiliar, Unsettled, CutOff, NotTracked, CoarseClock;
+        /// <summary>How wrong this answer is likely to be.</summary>
+        public ErrorEstimate ErrorEstimate = ErrorEstimate.Unknown;
         /// <summary>What pushes back: of poses and of gaps.</summary>
         public Touch Touch;
         public bool HasTouch;
@@ -36,6 +38,7 @@ namespace Papilla
             NotTracked = (from.Flags & 32) != 0;
             CoarseClock = (from.Flags & 64) != 0;
             if (from.Map.Count != UIntPtr.Zero) Marshal.Copy(from.Map.Data, Map, 0, (int)from.Map.Count);
+            ErrorEstimate = from.ErrorEstimate == IntPtr.Zero ? ErrorEstimate.Unknown : *(ErrorEstimate*)from.ErrorEstimate;
             HasTouch = from.Touch != IntPtr.Zero;
             if (HasTouch) Touch = *(Touch*)from.Touch;
             Copy(from.Summary, from.Summary == IntPtr.Zero ? 0 : 16, ref Summary);

@@ -37,7 +37,7 @@ namespace Papilla
         {
             internal uint Flags, HasSed, Column, Row, Width, Height;
             internal Samples Map, Vertices, PressurePa, RatesHz, Points, PointRatesHz, Actuators;
-            internal IntPtr Summary, Touch;
+            internal IntPtr Summary, Touch, ErrorEstimate;
         }
 
         [DllImport(Library)] internal static extern uint papilla_abi();

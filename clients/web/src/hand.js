@@ -19,6 +19,7 @@ import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, V
  * @property {number} sequence
  * @property {number} finger
  * @property {Touch} touch
+ * @property {Float32Array} errorEstimate how wrong this answer is likely to be (ERROR_ESTIMATE); infinite: not stated
  * @property {Float32Array | null} pressurePa as a map or at the vertices, if asked for
  * @property {Float32Array | null} shearPa traction along the skin, x y z a vertex in the finger's frame, if asked for
  * @property {Float32Array | null} displacementMm how far each vertex has moved, x y z, mm, in the finger's frame, if asked for
@@ -327,6 +328,7 @@ function read(data, view, ready) {
     sequence: view.getUint32(8, true),
     finger: view.getUint8(47),
     touch: touchOf(of('touch') ?? new Float32Array(16)),
+    errorEstimate: of('error_estimate') ?? new Float32Array(4).fill(Infinity),
     pressurePa: of('pressure'),
     shearPa: of('shear'),
     displacementMm: of('displacement'),

@@ -60,6 +60,8 @@ export interface Hello {
   afferents?: Afferents;
   relaxation?: Relaxation;
   spikes?: SpikesWish;
+  /** Answers carry `errorEstimate`. */
+  error_estimate?: boolean;
 }
 
 /** A shape of scene files with its dimensions, or a closed mesh. */
@@ -87,6 +89,8 @@ export interface HandHello {
   method?: ContactMethod;
   force_target?: boolean;
   stiffness?: boolean;
+  /** Answers carry `errorEstimate`. */
+  error_estimate?: boolean;
   pressure?: 'map' | 'vertices';
   /** Answers carry `shearPa`. */
   shear?: boolean;
@@ -137,7 +141,7 @@ export interface Touch {
 }
 
 export interface Section {
-  name: 'touch' | 'pressure' | 'shear' | 'displacement' | 'summary' | 'points' | 'point_rates' | 'actuators' | 'spikes' | 'rates' | 'map' | 'vertices';
+  name: 'touch' | 'pressure' | 'shear' | 'displacement' | 'error_estimate' | 'summary' | 'points' | 'point_rates' | 'actuators' | 'spikes' | 'rates' | 'map' | 'vertices';
   offset: number;
   bytes: number;
 }

@@ -214,6 +214,8 @@ export class Answer {
     this.actuators = null;
     /** The effect `spikes`. @type {Spikes | null} */
     this.spikes = null;
+    /** How wrong this answer is likely to be, by what it shows (ERROR_ESTIMATE); what is not stated is infinite. */
+    this.errorEstimate = new Float32Array(4).fill(Infinity);
     this.clientTimeUs = 0;
     this.roundTripUs = 0;
     /** Receipt to sending, in the server. */
@@ -256,7 +258,7 @@ export class Answer {
     const map = sections.find((s) => s.name === 'map');
     const rates = sections.find((s) => s.name === 'rates');
     return {
-      summary: of('summary'), points: of('points'), pointRatesHz: of('point_rates'), actuators: of('actuators'),
+      errorEstimate: of('error_estimate'), summary: of('summary'), points: of('points'), pointRatesHz: of('point_rates'), actuators: of('actuators'),
       spikes: sections.find((s) => s.name === 'spikes') ?? null,
       mapOffset: map ? map.offset : -1, ratesOffset: rates ? rates.offset : -1, rates: rates ? new Float32Array(MAP_LEN) : null,
     };
@@ -299,6 +301,7 @@ export class Answer {
    * @param {number} bytes length of the message
    */
   readBody(views, bytes) {
+    if (views.errorEstimate) this.errorEstimate = views.errorEstimate;
     this.summary = views.summary;
     this.points = views.points;
     this.pointRatesHz = views.pointRatesHz;
@@ -353,6 +356,9 @@ export class Answer {
     }
   }
 }
+
+/** Names of the numbers in `Answer.errorEstimate`: relative errors against finite elements. */
+export const ERROR_ESTIMATE = /** @type {const} */ (['sed_median', 'sed_p90', 'force_median', 'force_p90']);
 
 /** Names of the numbers in `Answer.summary`, with their units. */
 export const SUMMARY = /** @type {const} */ ([

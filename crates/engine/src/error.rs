@@ -107,6 +107,12 @@ pub enum EngineError {
         /// What the reader met.
         reason: String,
     },
+    /// The laws of errors cannot be read.
+    #[error("the laws of errors are unreadable: {reason}; `model-export calibrate` writes them")]
+    BadErrors {
+        /// What the reader met.
+        reason: String,
+    },
     /// The ladder cannot be read.
     #[error("the ladder is unreadable: {reason}; measure it again with `model-export ladder`")]
     BadLadder {

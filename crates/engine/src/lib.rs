@@ -30,6 +30,7 @@ pub mod card;
 mod choice;
 mod convolution;
 mod error;
+pub mod error_law;
 mod guard;
 mod info;
 pub mod ladder;

@@ -10,11 +10,15 @@ mod common;
 
 use common::backends;
 use papilla_engine::{
-    Backend, Card, EngineError, MAP_LEN, MAP_SIDE_PX, Session, card::Index, load_with,
+    Backend, Card, EngineError, MAP_LEN, MAP_SIDE_PX, Session,
+    card::Index,
+    error_law::{ErrorLaws, Way},
+    load_with,
 };
 use papilla_proto::{
     MapError, PressureRange, SampleType,
     atlas::{Atlas, Patch, Raster},
+    contact::ContactMethod,
     effects::OutOfRange,
 };
 use std::fs;
@@ -31,6 +35,23 @@ fn text(name: &str) -> String {
 fn masks() -> [Vec<bool>; 2] {
     let atlas = Atlas::from_json(&text("atlas.json")).unwrap();
     Patch::ALL.map(|patch| Raster::new(&atlas, patch).mask().to_vec())
+}
+
+/// The laws of errors are of the models and the contact model that ship.
+#[test]
+fn errors_are_stated_of_what_ships() {
+    let laws = ErrorLaws::from_json(&text("errors.json")).unwrap();
+    assert_eq!(laws.atlas_hash, Atlas::from_json(&text("atlas.json")).unwrap().hash());
+    let contact: serde_json::Value = serde_json::from_str(&text("contact.json")).unwrap();
+    assert_eq!(contact["contact_sha256"], laws.contact_sha256);
+    let index = Index::from_json(&text("index.json")).unwrap();
+    for name in index.models.iter().filter(|name| !index.on_demand.contains(name)) {
+        let card = Card::from_json(&text(&format!("{name}.json"))).unwrap();
+        assert!(laws.sed(&card.onnx_sha256, Way::Given).is_some(), "{name}: calibrate it anew");
+        let way = Way::Contact(ContactMethod::Pixels, &laws.contact_sha256);
+        assert!(laws.sed(&card.onnx_sha256, way).is_some(), "{name}: calibrate it anew");
+        assert!(laws.force(way).is_some());
+    }
 }
 
 /// A shipped model, and whether a map takes it long.

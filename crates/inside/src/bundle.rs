@@ -11,7 +11,7 @@ use papilla_proto::{
     contact::ContactErrors,
 };
 use papilla_render::SkinPixels;
-use papilla_session_contact::{Skin, contact_errors};
+use papilla_session_contact::{Skin, contact_errors, model_sha256};
 
 use crate::{
     LoadError,
@@ -31,6 +31,8 @@ pub struct Bundle {
     pub contact: Option<Arc<ContactModel>>,
     pub(crate) pixels: SkinPixels,
     pub(crate) contact_errors: Option<ContactErrors>,
+    /// SHA-256 of the contact model's file.
+    contact_sha256: Option<String>,
     pixel_skin: Option<Arc<PixelSkin>>,
     interface_skin: Option<Arc<InterfaceSkin>>,
 }
@@ -71,7 +73,7 @@ impl Bundle {
             .and_then(|atlas| hash.map_or(Ok(()), |hash| atlas.require_hash(hash)).map(|()| atlas))
             .map_err(|source| LoadError::Atlas { file, source })?;
         let contact = contact.map(|file| read_contact(file.to_owned(), &atlas)).transpose()?;
-        let (contact, contact_errors) = contact.unzip();
+        let ReadContact { contact, contact_errors, contact_sha256 } = contact.unwrap_or_default();
         let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
         let pixels = SkinPixels::from(&*raster);
         let pixel_skin = contact.as_ref().and_then(|m| PixelSkin::new(m, &atlas, raster.clone()));
@@ -80,7 +82,8 @@ impl Bundle {
         Ok(Self {
             pixel_skin: pixel_skin.map(Arc::new),
             interface_skin,
-            contact_errors: contact_errors.flatten(),
+            contact_errors,
+            contact_sha256,
             atlas,
             raster,
             contact,
@@ -97,25 +100,31 @@ impl Bundle {
             pixels: self.pixel_skin.as_ref(),
             interface: self.interface_skin.as_ref(),
             errors: self.contact_errors.as_ref(),
+            model_sha256: self.contact_sha256.as_deref(),
         }
     }
 }
 
 /// A contact model, and what methods err with it if a file beside it tells that.
-fn read_contact(
-    file: PathBuf,
-    atlas: &Atlas,
-) -> Result<(Arc<ContactModel>, Option<ContactErrors>), LoadError> {
+#[derive(Default)]
+struct ReadContact {
+    contact: Option<Arc<ContactModel>>,
+    contact_errors: Option<ContactErrors>,
+    contact_sha256: Option<String>,
+}
+
+fn read_contact(file: PathBuf, atlas: &Atlas) -> Result<ReadContact, LoadError> {
     let (file, bytes) = read(file)?;
     let beside = file.with_file_name("contact.json");
     let model = ContactModel::read(&bytes)
         .and_then(|model| model.require_atlas(atlas.hash()).map(|()| model))
         .map_err(|source| LoadError::Contact { file, source })?;
-    let errors = if beside.exists() {
+    let sha256 = model_sha256(&bytes);
+    let contact_errors = if beside.exists() {
         let (file, json) = read(beside)?;
-        contact_errors(&json, &bytes).map_err(|source| LoadError::Errors { file, source })?
+        contact_errors(&json, &sha256).map_err(|source| LoadError::Errors { file, source })?
     } else {
         None
     };
-    Ok((Arc::new(model), errors))
+    Ok(ReadContact { contact: Some(Arc::new(model)), contact_errors, contact_sha256: Some(sha256) })
 }

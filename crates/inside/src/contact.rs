@@ -4,7 +4,7 @@ use std::sync::{Arc, MutexGuard, PoisonError};
 
 use bytes::BytesMut;
 use papilla_proto::{
-    ErrorCode, HEADER_LEN, Hello, MAP_LEN, Problem, SampleType, Warning,
+    ErrorCode, ErrorEstimate, HEADER_LEN, Hello, MAP_LEN, Problem, SampleType, Warning,
     contact::{ContactMethod, MethodError},
     effects::Section,
     flags,
@@ -120,6 +120,7 @@ impl Contact {
         let taken = finger.take(frame, Some(pressure_pa))?;
         finger.write(bytes);
         papilla_render::require_finite(bytes)?;
+        state_nothing(&finger, bytes);
         let is_cut_off = bundle.pixels.are_cut_off(pressure_pa, taken.peak_pa);
         let cut_off = if is_cut_off { flags::CUT_OFF } else { 0 };
         Ok(Solved { flags: taken.flags | cut_off, rounds: taken.iterations.unwrap_or(0) })
@@ -135,7 +136,15 @@ impl Contact {
         let mut finger = only(hand)?;
         finger.lose();
         finger.write(bytes);
+        state_nothing(&finger, bytes);
         Ok(Solved { flags: flags::NOT_TRACKED | flags::NO_CONTACT, rounds: 0 })
+    }
+}
+
+/// No laws of errors are read with contact alone: where an error is asked for, it is not known.
+fn state_nothing(finger: &Finger, bytes: &mut BytesMut) {
+    if finger.tells_error() {
+        bytes.extend_from_slice(&ErrorEstimate::default().encode());
     }
 }
 

@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use papilla_engine::{Card, EngineError, card::Index};
+use papilla_engine::{Card, EngineError, card::Index, error_law::ErrorLaws};
 use papilla_proto::atlas::{AtlasError, Patch, Raster};
 use papilla_session_contact::AssetsError;
 use papilla_session_effects as effects;
@@ -82,6 +82,8 @@ pub struct Model {
     pub network: Arc<dyn papilla_engine::Model>,
     /// What is known of the network.
     pub card: Card,
+    /// By what the errors of answers are told; none: the folder has no `errors.json`.
+    pub(crate) error_laws: Option<ErrorLaws>,
 }
 
 impl std::fmt::Debug for Model {
@@ -133,7 +135,9 @@ impl Model {
         let hash = &network.info().atlas_hash;
         let bundle = Arc::new(Bundle::read(folder, contact, Some(hash))?);
         let interface = Raster::new(&bundle.atlas, Patch::Interface);
-        Ok(Self { bundle, interface, shared: effects::Shared::default(), network, card })
+        let error_laws = read_error_laws(folder.join("errors.json"))?;
+        let shared = effects::Shared::default();
+        Ok(Self { bundle, interface, shared, network, card, error_laws })
     }
 
     /// Draws values at the vertices of the skin as a map.
@@ -143,4 +147,13 @@ impl Model {
     pub fn rasterise(&self, values: &[f32], map: &mut [f32]) -> Result<(), AtlasError> {
         self.bundle.raster.rasterise(values, map)
     }
+}
+
+/// The laws of errors, if the folder has any.
+fn read_error_laws(file: PathBuf) -> Result<Option<ErrorLaws>, LoadError> {
+    if !file.exists() {
+        return Ok(None);
+    }
+    let (file, json) = read_text(file)?;
+    ErrorLaws::from_json(&json).map(Some).map_err(|source| LoadError::Engine { file, source })
 }

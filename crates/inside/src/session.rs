@@ -9,12 +9,12 @@ use bytes::BytesMut;
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode, scale_of};
 use papilla_engine::EngineError;
 use papilla_proto::{
-    ErrorCode, FrameHeader, HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX, MapSummary, PROTOCOL_VERSION,
-    PressureRange, Problem, Ready, RuntimeEffect, SampleType, Window,
+    ErrorCode, ErrorEstimate, FrameHeader, HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX, MapSummary,
+    PROTOCOL_VERSION, PressureRange, Problem, Ready, RuntimeEffect, SampleType, Window,
     effects::{OutOfRange, Section, SectionName},
     flags,
 };
-use papilla_render::{Known, Maps, Read, Rendering};
+use papilla_render::{Known, KnownErrors, Maps, Read, Rendering, Source, source_of};
 use papilla_session_contact::{Finger, FrameForm, Hand};
 use papilla_session_effects as effects;
 use papilla_session_effects::Effects;
@@ -79,6 +79,8 @@ pub struct Made {
     pub scale: f32,
     /// Time in the network.
     pub infer: Duration,
+    /// How wrong the answer is likely to be.
+    pub errors: ErrorEstimate,
 }
 
 impl std::fmt::Debug for Session {
@@ -278,9 +280,11 @@ impl Session {
             let message = "the frame is of another kind than the hello's";
             return Err(Problem::new(ErrorCode::WrongType, message).at("kind"));
         }
-        let (summary, mut found) = match frame {
+        let (summary, mut found, source) = match frame {
             Frame::NotTracked => {
-                papilla_render::lose(maps, Some(&mut of_finger), effects.as_deref_mut())
+                let effects = effects.as_deref_mut();
+                let (summary, flags) = papilla_render::lose(maps, Some(&mut of_finger), effects);
+                (summary, flags, Source::Other)
             }
             Frame::Map(pressure_pa) => {
                 if pressure_pa.len() != MAP_LEN {
@@ -288,12 +292,12 @@ impl Session {
                     return Err(Problem::new(ErrorCode::WrongLength, message).at("count"));
                 }
                 maps.pressure_pa.copy_from_slice(pressure_pa);
-                (maps.check_of(&of_finger, *range, &model.bundle.pixels)?, 0)
+                (maps.check_of(&of_finger, *range, &model.bundle.pixels)?, 0, Source::Map)
             }
             Frame::Window { window, sample_type, scale, payload } => {
                 let input = Input::Window { window, sample_type, scale: unit(scale) };
                 decode(input, payload, &mut maps.pressure_pa)?;
-                (maps.check_of(&of_finger, *range, &model.bundle.pixels)?, 0)
+                (maps.check_of(&of_finger, *range, &model.bundle.pixels)?, 0, Source::Map)
             }
             Frame::Rows { sample_type, scale, payload } => {
                 let rows = papilla_session_contact::Frame {
@@ -303,15 +307,21 @@ impl Session {
                     time_us,
                 };
                 let taken = maps.take(&mut of_finger, rows, *range, shows_sed)?;
-                (MapSummary { peak_pa: taken.peak_pa }, taken.flags)
+                (MapSummary { peak_pa: taken.peak_pa }, taken.flags, source_of(&taken))
             }
         };
+        let tells_error = of_finger.tells_error();
         let known = Known {
             skin: &model.bundle.pixels,
             input_max: model.card.input_statistics_max,
             response_max_per_mpa: model.card.response_max_per_mpa,
+            errors: model
+                .error_laws
+                .as_ref()
+                .filter(|_| tells_error)
+                .map(|laws| KnownErrors { laws, onnx_sha256: Some(&model.card.onnx_sha256) }),
         };
-        let read = Read { summary, range: *range, time_us, is_tracked, shows_sed };
+        let read = Read { summary, range: *range, time_us, is_tracked, shows_sed, source };
         let mut rendering =
             Rendering::begin(maps, Some(&mut of_finger), effects.as_deref_mut(), known, read);
         let mut infer = Duration::ZERO;
@@ -321,11 +331,15 @@ impl Session {
             infer = start.elapsed();
         }
         found |= rendering.flags();
-        let time_us = rendering.time_us();
+        let (time_us, errors) = (rendering.time_us(), rendering.error_estimate());
         rendering.end(network.as_mut()).map_err(|error| of_engine(&error))?;
         of_finger.write(bytes);
         papilla_render::require_finite(bytes)?;
-        let mut made = Made { flags: found, shows_sed, window: Window::WHOLE, scale: 1.0, infer };
+        if tells_error {
+            bytes.extend_from_slice(&errors.encode());
+        }
+        let (window, scale) = (Window::WHOLE, 1.0);
+        let mut made = Made { flags: found, shows_sed, window, scale, infer, errors };
         if let Some(effects) = effects {
             let written = effects.write(&maps.pressure_pa, &maps.sed_j_per_m3, time_us, bytes);
             let written = written.map_err(|error| {

@@ -8,7 +8,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! use papilla_proto::{PressureRange, atlas::{Atlas, Patch, Raster}, effects::OutOfRange, flags};
-//! use papilla_render::{Known, Maps, Read, Rendering, SkinPixels};
+//! use papilla_render::{Known, Maps, Read, Rendering, SkinPixels, Source};
 //!
 //! let atlas = Atlas::from_json(&std::fs::read_to_string("models/atlas.json")?)?;
 //! let skin = SkinPixels::from(&Raster::new(&atlas, Patch::Skin));
@@ -20,8 +20,9 @@
 //! let mut maps = Maps::default();
 //! (95..115).for_each(|row| maps.pressure_pa[row * 224 + 105..][..25].fill(8e3));
 //! let summary = maps.check(range, &skin)?;
-//! let known = Known { skin: &skin, input_max: None, response_max_per_mpa: None };
-//! let read = Read { summary, range, time_us: 0, is_tracked: true, shows_sed: true };
+//! let known = Known { skin: &skin, input_max: None, response_max_per_mpa: None, errors: None };
+//! let source = Source::Map;
+//! let read = Read { summary, range, time_us: 0, is_tracked: true, shows_sed: true, source };
 //! let mut rendering = Rendering::begin(&mut maps, None, None, known, read);
 //! assert_eq!(rendering.flags() & flags::OUT_OF_RANGE, 0);
 //! rendering.infer(session.as_mut())?;
@@ -34,14 +35,14 @@
 mod frame;
 mod skin;
 
-use papilla_engine::{EngineError, Session};
+use papilla_engine::{EngineError, Session, error_law::Facts};
 use papilla_proto::{
-    ErrorCode, InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem,
-    finite::first_not_finite_in, flags, keep_inside, peak,
+    ErrorCode, InputStatistics, Look, MAP_LEN, MapSummary, PressureRange, Problem,
+    finite::first_not_finite_in, flags, keep_inside, map::PeakAndSum,
 };
 use papilla_session_contact::{Finger, Frame, Taken};
 
-pub use frame::{Known, Read, Rendering, lose};
+pub use frame::{Known, KnownErrors, Read, Rendering, Source, facts_of_force, lose, source_of};
 pub use skin::SkinPixels;
 
 /// Room above the greatest response of the training, as a factor: about what networks err by at worst
@@ -75,6 +76,8 @@ pub struct Maps {
     is_clamped: bool,
     /// Greatest pressure that the network sees, Pa.
     seen_peak_pa: f32,
+    /// What was seen of that pressure, if the training is known.
+    look: Look,
 }
 
 /// What [`Maps::judge`] found.
@@ -89,7 +92,8 @@ pub(crate) struct Judged {
 impl Default for Maps {
     fn default() -> Self {
         let [pressure_pa, sed_j_per_m3, clamped_pa] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
-        Self { pressure_pa, sed_j_per_m3, clamped_pa, is_clamped: false, seen_peak_pa: 0.0 }
+        let (seen_peak_pa, look) = (0.0, Look::default());
+        Self { pressure_pa, sed_j_per_m3, clamped_pa, is_clamped: false, seen_peak_pa, look }
     }
 }
 
@@ -158,7 +162,10 @@ impl Maps {
         self.is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
         self.seen_peak_pa = if self.is_clamped { range.trained_max_pa } else { summary.peak_pa };
         let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
-        let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
+        let is_outside = |trained| {
+            self.look = Look::of(seen_pa);
+            self.look.statistics.is_out_of_distribution(trained)
+        };
         let is_unfamiliar = !is_zero && trained_max.is_some_and(is_outside);
         let flags = [
             (range.is_left_by(summary), flags::OUT_OF_RANGE),
@@ -186,14 +193,24 @@ impl Maps {
     /// no indentation makes tissue store more energy than the square of the pressure allows. To be
     /// asked after [`infer`](Self::infer), before anything is added to SED.
     #[must_use]
-    pub(crate) fn judge_answer(&self, response_max_per_mpa: Option<f32>) -> u8 {
-        let top = peak(&self.sed_j_per_m3);
+    pub(crate) fn judge_answer(&self, sed: PeakAndSum, response_max_per_mpa: Option<f32>) -> u8 {
+        let top = sed.peak;
         let is_beyond = |most: f32| {
             let peak_mpa = 1e-6 * self.seen_peak_pa;
             // SED in MPa: 1 J/m3 is 1 Pa.
             1e-6 * top > RESPONSE_HEADROOM * most * peak_mpa * peak_mpa
         };
         if response_max_per_mpa.is_some_and(is_beyond) { flags::UNFAMILIAR } else { 0 }
+    }
+
+    /// Greatest SED and the sum of it.
+    pub(crate) fn tell_sed(&self) -> PeakAndSum {
+        PeakAndSum::of(&self.sed_j_per_m3)
+    }
+
+    /// What pressure and answer show of the answer's error.
+    pub(crate) fn facts(&self, sed: PeakAndSum, trained: InputStatistics) -> Facts {
+        Facts::of_sed(&self.look, self.seen_peak_pa, sed.sum, trained.cells)
     }
 
     /// Adds to SED what traction along the skin changes, if the finger is to feel it.
@@ -221,8 +238,9 @@ mod tests {
             [(0.0, 0), (2400.0, 0), (3500.0, 0), (3700.0, flags::UNFAMILIAR)]
         {
             maps.sed_j_per_m3[7] = sed_j_per_m3;
-            assert_eq!(maps.judge_answer(Some(6.0)), flag, "{sed_j_per_m3} J/m3");
-            assert_eq!(maps.judge_answer(None), 0, "nothing is known of the training");
+            let sed = maps.tell_sed();
+            assert_eq!(maps.judge_answer(sed, Some(6.0)), flag, "{sed_j_per_m3} J/m3");
+            assert_eq!(maps.judge_answer(sed, None), 0, "nothing is known of the training");
         }
     }
 }

@@ -35,6 +35,8 @@ pub struct ContactAssets {
     times: OnceLock<Times>,
     /// What methods err with this model; none if nobody measured it.
     pub errors: Option<ContactErrors>,
+    /// SHA-256 of the model's file.
+    pub sha256: String,
 }
 
 /// What things take, us.
@@ -76,8 +78,9 @@ impl ContactAssets {
         model.require_atlas(atlas.hash())?;
         let pixels = PixelSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
         let interface = InterfaceSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
-        let errors = errors.map(|json| contact_errors(json, bytes)).transpose()?.flatten();
-        Ok(Self { model, pixels, interface, times: OnceLock::new(), errors })
+        let sha256 = model_sha256(bytes);
+        let errors = errors.map(|json| contact_errors(json, &sha256)).transpose()?.flatten();
+        Ok(Self { model, pixels, interface, times: OnceLock::new(), errors, sha256 })
     }
 
     /// Measures on this thread what every method takes; until then times are expected, not known.
@@ -135,14 +138,19 @@ impl ContactAssets {
     }
 }
 
-/// What `contact.json` says, if it is of the contact model with these bytes.
+/// SHA-256 of a contact model's file, in hexadecimal.
+#[must_use]
+pub fn model_sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// What `contact.json` says, if it is of the contact model whose file has this SHA-256.
 ///
 /// # Errors
 /// It cannot be read.
-pub fn contact_errors(json: &[u8], model: &[u8]) -> Result<Option<ContactErrors>, AssetsError> {
+pub fn contact_errors(json: &[u8], sha256: &str) -> Result<Option<ContactErrors>, AssetsError> {
     let errors: ContactErrors = json::read(json).map_err(AssetsError::Errors)?;
-    let hash: String = Sha256::digest(model).iter().map(|b| format!("{b:02x}")).collect();
-    Ok((errors.contact_sha256 == hash).then_some(errors))
+    Ok((errors.contact_sha256 == sha256).then_some(errors))
 }
 
 /// What a frame takes on one core of the machine of the reports, us.

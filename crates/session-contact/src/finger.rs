@@ -9,7 +9,7 @@ use papilla_contact::{
 use papilla_proto::{
     ErrorCode, Hello, MAP_LEN, PressureRange, Problem, RuntimeEffect, SampleType,
     atlas::Raster,
-    contact::{Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
+    contact::{ContactMethod, Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
     effects::OutOfRange,
     flags,
 };
@@ -18,6 +18,7 @@ use papilla_session_state::{Reader, StateError, Writer};
 
 use super::{
     FrameForm, Skin, announced,
+    felt::Felt,
     gaps::GapReader,
     method::Chosen,
     solver::{FingerSolver, of_contact},
@@ -29,6 +30,12 @@ pub struct Finger {
     form: FrameForm,
     person: Person,
     solver: Option<FingerSolver>,
+    /// The method, where rigid objects without friction press.
+    plain_method: Option<ContactMethod>,
+    /// SHA-256 of the contact model's file.
+    model_sha256: Option<Box<str>>,
+    /// Answers tell how wrong they are likely to be.
+    tells_error: bool,
     out: Contact,
     objects: Vec<Object>,
     /// Samples of a frame, and of what follows them.
@@ -76,6 +83,8 @@ pub struct Taken {
     pub flags: u8,
     /// Linearisations that the solve took; none if nothing was solved.
     pub iterations: Option<u32>,
+    /// By what the error of the force is told, where rigid objects without friction press.
+    pub felt: Option<Felt>,
 }
 
 impl Finger {
@@ -101,11 +110,21 @@ impl Finger {
         if announced::has_friction(hello) {
             out.shear_pa.resize(vertices, [0.0; 3]);
         }
+        let is_plain =
+            |object: &Object| object.stiffness_mpa_per_mm.is_infinite() && object.friction <= 0.0;
+        let plain_method = solved.map(|(chosen, _)| chosen.method).filter(|_| {
+            form.input == Input::Objects
+                && !announced::has_friction(hello)
+                && objects.iter().all(is_plain)
+        });
         let sends_map = hello.pressure == Some(SampleLayout::Map);
         Ok(Self {
             form,
             person,
             solver,
+            plain_method,
+            model_sha256: skin.model_sha256.map(Into::into),
+            tells_error: hello.error_estimate == Some(true),
             out,
             objects,
             samples: vec![0.0; samples],
@@ -125,6 +144,19 @@ impl Finger {
     #[must_use]
     pub fn reads_windows(&self) -> bool {
         self.form.is_window()
+    }
+
+    /// SHA-256 of the file of the contact model that finds pressure, if it is from one.
+    #[must_use]
+    pub fn model_sha256(&self) -> Option<&str> {
+        self.model_sha256.as_deref()
+    }
+
+    /// Whether answers are to tell how wrong they are likely to be, behind what
+    /// [`write`](Self::write) appends.
+    #[must_use]
+    pub fn tells_error(&self) -> bool {
+        self.tells_error
     }
 
     /// Whether frames are pressure, which a client may have wrong.
@@ -300,7 +332,11 @@ impl Finger {
             | told(!quality.settled, flags::UNSETTLED)
             | if peak_pa > 0.0 || quality.is_held { 0 } else { flags::NO_CONTACT };
         let iterations = is_solved.then_some(self.out.effort.iterations);
-        Taken { peak_pa, flags, iterations }
+        let felt = self
+            .plain_method
+            .filter(|_| peak_pa > 0.0)
+            .and_then(|method| Felt::of(method, &self.out, self.person));
+        Taken { peak_pa, flags, iterations, felt }
     }
 
     fn pixels(&self) -> Option<&PixelContact> {

@@ -16,7 +16,7 @@
 //! // A service without a contact model takes pressure alone.
 //! let raster = std::sync::Arc::new(Raster::new(&atlas, Patch::Skin));
 //! let skin = Skin { atlas: &atlas, raster: &raster, model: None, pixels: None, interface: None,
-//!     errors: None };
+//!     errors: None, model_sha256: None };
 //! let hello = Hello::default();
 //! assert_eq!(Hand::of(&hello, skin)?.fingers().len(), 1);
 //! let objects = Hello { input: Some(Input::Objects), ..hello };
@@ -27,6 +27,7 @@
 
 mod announced;
 mod assets;
+mod felt;
 mod finger;
 mod frame;
 mod gaps;
@@ -41,14 +42,15 @@ use std::sync::{Arc, Mutex};
 
 use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_proto::{
-    ErrorCode, HEADER_LEN, Hello, MAP_LEN, Problem, Warning,
+    ERROR_ESTIMATE_LEN, ErrorCode, HEADER_LEN, Hello, MAP_LEN, Problem, Warning,
     atlas::{Atlas, Raster},
     contact::{ContactErrors, ContactMethod, Input, SampleLayout, TOUCH_LEN},
     effects::{Section, SectionName},
 };
 
 pub use announced::of_finger;
-pub use assets::{AssetsError, ContactAssets, contact_errors};
+pub use assets::{AssetsError, ContactAssets, contact_errors, model_sha256};
+pub use felt::Felt;
 pub use finger::{Finger, Frame, Taken};
 pub use frame::FrameForm;
 
@@ -73,6 +75,8 @@ pub struct Skin<'a> {
     pub interface: Option<&'a Arc<InterfaceSkin>>,
     /// What methods err with that model; none if nobody measured it.
     pub errors: Option<&'a ContactErrors>,
+    /// SHA-256 of that model's file, if it is from one.
+    pub model_sha256: Option<&'a str>,
 }
 
 /// The fingers of one session.
@@ -195,7 +199,9 @@ impl Hand {
         &self.fingers
     }
 
-    /// What [`Finger::write`] puts first into the payload of an answer.
+    /// What comes first in the payload of an answer: what [`Finger::write`] puts there, then, if the
+    /// hello asks for it, an [`ErrorEstimate`](papilla_proto::ErrorEstimate), which whoever renders
+    /// appends.
     #[must_use]
     pub fn sections(&self) -> &[Section] {
         &self.sections
@@ -242,6 +248,10 @@ fn sections(hello: &Hello, input: Input, vertices: usize) -> Vec<Section> {
         (SectionName::Pressure, pressure),
         (SectionName::Shear, shear),
         (SectionName::Displacement, displacement),
+        (
+            SectionName::ErrorEstimate,
+            (hello.error_estimate == Some(true)).then_some(ERROR_ESTIMATE_LEN),
+        ),
     ];
     for (name, bytes) in all {
         let Some(bytes) = bytes else { continue };

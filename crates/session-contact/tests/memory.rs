@@ -108,6 +108,7 @@ fn no_finger_takes_more_than_is_said() {
         pixels: pixels.as_ref(),
         interface: interface.as_ref(),
         errors: None,
+        model_sha256: None,
     };
     let lowest = model.lowest_mm().map(|v| v as f32);
     let vertices = model.vertices();

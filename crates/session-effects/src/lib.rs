@@ -280,6 +280,16 @@ impl Effects {
         &self.names
     }
 
+    /// Whether one of them changes the pressure on the tissue, or the SED of it: creep, and traction
+    /// along the skin.
+    #[must_use]
+    pub fn changes_tissue(&self) -> bool {
+        let changes = |of: &RuntimeEffect| {
+            matches!(of, RuntimeEffect::Relaxation | RuntimeEffect::ShearEnergy)
+        };
+        self.names.iter().any(changes)
+    }
+
     /// What the payload of an answer holds.
     #[must_use]
     pub fn sections(&self) -> &[Section] {

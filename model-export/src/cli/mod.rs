@@ -1,5 +1,6 @@
 //! The command line.
 
+mod calibrate;
 mod check;
 mod contact;
 mod contact_maps;
@@ -41,7 +42,9 @@ A new model, from the trainer's file to the service:
   model-export table    models/*.json
 All models and the solver itself, error against time:
   model-export ladder   --data data --models models --fe out/rungs --out docs/reports
-  model-export here     --out out/here";
+  model-export here     --out out/here
+How wrong each answer is likely to be:
+  model-export calibrate --network pico nano small large large-maps";
 
 /// Parsed command line.
 #[derive(Debug, Parser)]
@@ -71,11 +74,19 @@ enum Command {
     /// energy, SSIM; and the time of each inference.
     #[command(after_long_help = EXIT_CODES)]
     Evaluate(evaluate::Options),
+    /// Fit by what answers show how wrong they are likely to be, and check it.
+    ///
+    /// Networks and contact are asked about simulations that no training saw. Laws of their errors are
+    /// fitted to them and written as MODELS/errors.json, by which the service states the error of each
+    /// answer. Each simulation is checked by laws of others; two sets are set aside for the check
+    /// alone. Written besides: a page with tables, the reliability diagram, the figures as JSON.
+    #[command(after_long_help = EXIT_CODES)]
+    Calibrate(calibrate::Options),
     /// Print a Markdown table of accuracy against time for several cards.
     #[command(after_long_help = EXIT_CODES)]
     Table {
         /// Cards written by `evaluate`, in the order of the rows; other JSON files beside
-        /// them (atlas.json, index.json, ladder.json, replay.json) are passed over.
+        /// them (atlas.json, index.json, ladder.json, replay.json, errors.json) are passed over.
         #[arg(required = true, value_name = "CARD")]
         cards: Vec<PathBuf>,
     },
@@ -137,6 +148,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     match &arguments.command {
         Command::Check(options) => check::run(options, json),
         Command::Evaluate(options) => evaluate::run(options, json),
+        Command::Calibrate(options) => calibrate::run(options, json),
         Command::Table { cards } => print_table(cards, json),
         Command::Index(options) => index::run(options, json),
         Command::Patterns(options) => patterns::run(options, json),
@@ -151,7 +163,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn print_table(paths: &[PathBuf], json: bool) -> anyhow::Result<()> {
     let passed_over = |path: &&PathBuf| {
-        let others = ["atlas.json", "index.json", "ladder.json", "replay.json"];
+        let others = [
+            "atlas.json",
+            "contact.json",
+            "errors.json",
+            "index.json",
+            "ladder.json",
+            "replay.json",
+        ];
         !path.file_name().is_some_and(|name| others.iter().any(|other| name == *other))
     };
     let cards = paths

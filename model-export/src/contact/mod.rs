@@ -7,7 +7,7 @@ mod placed;
 
 pub use self::friction::{RUBBING, Rubbed, measure as measure_friction};
 pub use self::maps::ContactMaps;
-use self::placed::Placed;
+pub(crate) use self::placed::Placed;
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile};
 use crate::processor::thread_s;
@@ -64,7 +64,7 @@ impl Rung {
         Self::Pixels,
     ];
 
-    const fn pixel_spacing(self) -> Option<PixelSpacing> {
+    pub(crate) const fn pixel_spacing(self) -> Option<PixelSpacing> {
         match self {
             Self::CoarsePixels => Some(PixelSpacing::Two),
             Self::Pixels => Some(PixelSpacing::One),
@@ -73,7 +73,7 @@ impl Rung {
     }
 
     /// The method of a session; none that a session may name.
-    const fn method(self) -> Option<ContactMethod> {
+    pub(crate) const fn method(self) -> Option<ContactMethod> {
         match self {
             Self::Springs => Some(ContactMethod::Springs),
             Self::SmallStrain => Some(ContactMethod::SmallStrain),
@@ -174,7 +174,7 @@ impl Models {
         self.finger.require_atlas(dataset.atlas().hash()).map_err(refused)
     }
 
-    fn solver(&self, rung: Rung) -> Option<Solver> {
+    pub(crate) fn solver(&self, rung: Rung) -> Option<Solver> {
         let (model, method) = match rung {
             Rung::Springs => (&self.finger, Method::Springs),
             Rung::HalfSpace => (&self.half_space, Method::SmallStrain),
@@ -252,7 +252,7 @@ pub fn measure(
 }
 
 /// Contact on the pixels of a dataset's maps; `None` if the model holds none of the finger's skin.
-fn pixel_contact(
+pub(crate) fn pixel_contact(
     models: &Models,
     dataset: &Dataset,
     spacing: PixelSpacing,

@@ -12,7 +12,7 @@ use papilla_proto::sdf::{IndenterSpec, Placement, SignedDistance, TouchError, fi
 use std::sync::Arc;
 
 /// An indenter on its way into the finger.
-pub(super) struct Placed {
+pub(crate) struct Placed {
     shape: Arc<dyn SignedDistance>,
     first_touch: Placement,
     direction: [f64; 3],
@@ -21,7 +21,7 @@ pub(super) struct Placed {
 impl Placed {
     /// As the dataset's simulations place it: on graded meshes by the skin itself, on the even
     /// lattice by its nodes. `None` if it passes the finger.
-    pub(super) fn at_first_touch(
+    pub(crate) fn at_first_touch(
         dataset: &Dataset,
         indentation: &IndentationEntry,
         shard: &Shard,
@@ -51,7 +51,7 @@ impl Placed {
     }
 
     /// It at a depth from there, slid along its own x and y.
-    pub(super) fn at(&self, depth_mm: f64, slide_mm: [f64; 2]) -> Object {
+    pub(crate) fn at(&self, depth_mm: f64, slide_mm: [f64; 2]) -> Object {
         let mut placement = self.first_touch;
         for i in 0..3 {
             let [x, y, _] = placement.rotation[i];

@@ -174,6 +174,15 @@ pub(crate) fn relative_l2(predicted: &[f32], truth: &[f32]) -> Option<f64> {
     all.relative_l2()
 }
 
+/// The same over the pixels of the interface.
+pub(crate) fn relative_l2_on(ground: &Ground, predicted: &[f32], truth: &[f32]) -> Option<f64> {
+    let mut all = Sums::default();
+    for ((p, t), _) in predicted.iter().zip(truth).zip(&ground.mask).filter(|(_, is_in)| **is_in) {
+        all.add(*p, *t);
+    }
+    all.relative_l2()
+}
+
 /// Quantile of `values` at `q` in 0..=1, interpolated linearly between the two nearest
 /// order statistics (numpy's default). None if there are no values.
 #[must_use]

@@ -324,6 +324,8 @@ pub enum SectionName {
     Shear,
     /// How far the skin has moved, three f32 a vertex, mm, in the finger's frame.
     Displacement,
+    /// How wrong the answer is likely to be: an [`ErrorEstimate`](crate::ErrorEstimate).
+    ErrorEstimate,
     /// A [`Summary`](crate::Summary).
     Summary,
     /// SED, one f32 a point, J/m3.

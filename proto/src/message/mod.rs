@@ -176,6 +176,10 @@ pub struct Hello {
     /// Whether each frame holds a net force to be met.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_target: Option<bool>,
+    /// Whether answers tell how wrong they are likely to be: the section
+    /// [`ErrorEstimate`](crate::ErrorEstimate).
+    #[serde(default)]
+    pub error_estimate: Option<bool>,
     /// Whether answers tell the local stiffness.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<bool>,
@@ -260,6 +264,7 @@ impl Default for Hello {
             fingers: None,
             method: None,
             force_target: None,
+            error_estimate: None,
             stiffness: None,
             pressure: None,
             shear: None,

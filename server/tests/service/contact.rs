@@ -1,7 +1,7 @@
 //! Objects and gaps in, forces out, several fingers.
 
 use papilla_proto::{
-    FrameHeader, FrameKind, FrameStatus, HEADER_LEN, MAP_LEN, SampleType,
+    ErrorEstimate, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, MAP_LEN, SampleType,
     contact::{POSE_LEN, Pose, TOUCH_LEN, Touch},
     flags,
 };
@@ -520,4 +520,82 @@ async fn a_contact_model_lies_among_the_models_or_is_named() {
     assert!(error.contains("finger.contact") && error.contains("atlas"), "{error}");
     let error = Service::on(model_folder(), named).await.err().unwrap().to_string();
     assert!(error.contains("mine.contact") && error.contains("--contact"), "{error}");
+}
+
+/// A law that states the same of every answer.
+fn law(median: f32) -> Value {
+    json!({"median": median.ln(), "bound": 2f32.ln(), "terms": []})
+}
+
+/// What was calibrated is stated, in a session that asks for it and of a posted map; all else is not.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_states_its_error_where_that_was_calibrated() {
+    let folder = model_folder_on(&atlas());
+    write(folder.path(), "finger.contact", &model());
+    let read = |name: &str| -> Value {
+        serde_json::from_slice(&std::fs::read(folder.path().join(name)).unwrap()).unwrap()
+    };
+    let name = read("index.json")["default"].as_str().unwrap().to_owned();
+    let card = read(&format!("{name}.json"));
+    let laws = json!({
+        "format": 1, "atlas_hash": atlas().hash(),
+        "contact_sha256": papilla_session_contact::model_sha256(&model()),
+        "networks": [{
+            "name": name, "onnx_sha256": card["onnx_sha256"], "given": law(0.05),
+            "contact": [{"method": "pixels", "law": law(0.1)}],
+        }],
+        "force": [{"method": "pixels", "law": law(0.01)}],
+    });
+    write(folder.path(), "errors.json", laws.to_string().as_bytes());
+    let service = Service::on(folder, |_| ()).await.unwrap();
+    let mut socket = service.socket().await;
+    let asked = |members: Value| {
+        let mut hello = ball_hello(&json!({"error_estimate": true, "out_of_range": "flag"}));
+        for (name, value) in members.as_object().unwrap() {
+            hello[name] = value.clone();
+        }
+        hello
+    };
+    let stated = |payload: &[u8]| {
+        let ErrorEstimate { sed, force } = ErrorEstimate::decode(&payload[TOUCH_LEN..]).unwrap();
+        [sed.median, sed.p90, force.median, force.p90]
+    };
+    let ready = socket.open(asked(json!({}))).await;
+    assert_eq!(ready["sections"][1], json!({"name": "error_estimate", "offset": 112, "bytes": 16}));
+    socket.send(rows(1, 0, &[deep(0.05)])).await;
+    let (_, touch, payload) = hear(&mut socket).await;
+    for (found, due) in stated(&payload).into_iter().zip([0.1, 0.2, 0.01, 0.02]) {
+        assert!((found / due - 1.0).abs() < 1e-5, "{found}, {due} is due; {touch:?}");
+    }
+    socket.send(rows(2, 0, &[deep(-9.0)])).await;
+    let (header, _, payload) = hear(&mut socket).await;
+    assert_eq!(header.flags, flags::NO_CONTACT);
+    assert!(stated(&payload).iter().all(|of| of.is_infinite()));
+    // Forces alone: no network is asked.
+    socket.open(asked(json!({"map": false}))).await;
+    socket.send(rows(3, 0, &[deep(0.05)])).await;
+    let (_, _, payload) = hear(&mut socket).await;
+    assert!(stated(&payload)[1].is_infinite() && stated(&payload)[3] < 0.021);
+    let ball = |members: Value| {
+        let mut ball = json!({"shape": {"shape": "sphere", "radius_mm": RADIUS_MM}});
+        ball.as_object_mut().unwrap().extend(members.as_object().unwrap().clone());
+        json!([ball])
+    };
+    for members in [
+        json!({"method": "second_order"}),
+        json!({"objects": ball(json!({"friction": 0.5}))}),
+        json!({"objects": ball(json!({"stiffness_mpa_per_mm": 1.0}))}),
+        json!({"effects": ["relaxation"]}),
+    ] {
+        socket.open(asked(members.clone())).await;
+        socket.send(rows(4, 0, &[deep(0.05)])).await;
+        let (_, touch, payload) = hear(&mut socket).await;
+        assert!(stated(&payload).iter().all(|of| of.is_infinite()), "{members} {touch:?}");
+    }
+    let is_pressed = |i: usize| (100..120).contains(&(i / 224)) && (100..120).contains(&(i % 224));
+    let pressure_pa = (0..MAP_LEN).map(|i| if is_pressed(i) { 500.0_f32 } else { 0.0 });
+    let map: Vec<u8> = pressure_pa.flat_map(f32::to_le_bytes).collect();
+    let answer = service.post("/v1/sed", map).send().await;
+    let found: f32 = answer.header("x-papilla-sed-error-p90").unwrap().parse().unwrap();
+    assert!((found / 0.1 - 1.0).abs() < 1e-5, "{found}");
 }

@@ -73,6 +73,7 @@ fn hand() -> (Hand, [f32; 3]) {
         pixels: None,
         interface: None,
         errors: None,
+        model_sha256: None,
     };
     (Hand::of(&hello, skin).unwrap(), model.lowest_mm().map(|v| v as f32))
 }

@@ -81,12 +81,13 @@ pub(crate) struct PapillaAnswer {
     actuators: PapillaSamples,
     summary: *const f32,
     touch: *const f32,
+    error_estimate: *const f32,
 }
 
 impl From<Answer<'_>> for PapillaAnswer {
     fn from(answer: Answer<'_>) -> Self {
         let Window { x, y, width, height } = answer.window;
-        let sixteen = |values: &[f32]| PapillaSamples::from(values).data;
+        let numbers = |values: &[f32]| PapillaSamples::from(values).data;
         Self {
             flags: u32::from(answer.flags),
             has_sed: answer.has_sed.into(),
@@ -101,8 +102,9 @@ impl From<Answer<'_>> for PapillaAnswer {
             points: answer.points.into(),
             point_rates_hz: answer.point_rates_hz.into(),
             actuators: answer.actuators.into(),
-            summary: sixteen(answer.summary),
-            touch: sixteen(answer.touch),
+            summary: numbers(answer.summary),
+            touch: numbers(answer.touch),
+            error_estimate: numbers(answer.error_estimate),
         }
     }
 }
@@ -113,5 +115,5 @@ const _: () = {
     use std::mem::offset_of;
     assert!(size_of::<PapillaPose>() == 28 && size_of::<PapillaNetForce>() == 16);
     assert!(size_of::<PapillaModelInfo>() == 80 && offset_of!(PapillaModelInfo, triangles) == 40);
-    assert!(size_of::<PapillaAnswer>() == 152 && offset_of!(PapillaAnswer, map) == 24);
+    assert!(size_of::<PapillaAnswer>() == 160 && offset_of!(PapillaAnswer, map) == 24);
 };

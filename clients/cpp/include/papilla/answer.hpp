@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -24,6 +25,15 @@ enum SummaryMember : std::size_t {
   force_n, contact_area_mm2, pressure_max_pa, pressure_u_px, pressure_v_px, sed_max_j_per_m3,
   sed_max_u_px, sed_max_v_px, sed_integral_uj_per_m, sed_u_px, sed_v_px, sed_uu_px2, sed_uv_px2,
   sed_vv_px2, sed_mean_j_per_m3, sa1_rate_hz
+};
+
+/// How wrong an answer is likely to be, by what it shows: relative errors against finite elements. What is not
+/// stated is infinite.
+struct ErrorEstimate {
+  float sed_median = std::numeric_limits<float>::infinity();    ///< half of such maps of SED err less (relative L2)
+  float sed_p90 = std::numeric_limits<float>::infinity();       ///< nine of ten such maps err less
+  float force_median = std::numeric_limits<float>::infinity();  ///< the same of the size of the force that contact found
+  float force_p90 = std::numeric_limits<float>::infinity();
 };
 
 /// A unit fired: its number in ready's `units`, and when, by the client's clock.
@@ -65,6 +75,7 @@ struct Answer {
   std::vector<float> pressure_pa;     ///< that was found, if asked for: a map, or a value a vertex
   std::vector<float> shear_pa;        ///< traction along the skin, x y z a vertex in the finger's frame, if asked for
   std::vector<float> vertices;        ///< SED at the atlas' vertices, if asked for in place of a map
+  ErrorEstimate error_estimate;
   bool has_summary = false;
   std::array<float, 16> summary{};    ///< see SummaryMember
   std::vector<float> rates_hz;        ///< firing rates, a whole map or a value a vertex: the effect `afferents`
@@ -79,6 +90,7 @@ struct Answer {
     has_map = has_touch = has_summary = false;
     window = {0, 0, 0, 0};
     touch = {};
+    error_estimate = {};
     summary = {};
     spikes.clear();
     spikes_total = 0;
@@ -132,13 +144,14 @@ struct Ready {
   std::uint64_t tier_number = 0;
   float pressure_max_pa = 0.0F;
   std::string atlas_hash;
-  Section touch, pressure, shear, vertices, summary, rates, points, point_rates, actuators, spikes, map;
+  Section touch, pressure, shear, error_estimate, vertices, summary, rates, points, point_rates, actuators, spikes, map;
 
   /// The section of that name; null if there is no such section.
   Section* section(std::string_view name) {
     return name == "touch"         ? &touch
            : name == "pressure"    ? &pressure
            : name == "shear"       ? &shear
+           : name == "error_estimate" ? &error_estimate
            : name == "vertices"    ? &vertices
            : name == "summary"     ? &summary
            : name == "rates"       ? &rates

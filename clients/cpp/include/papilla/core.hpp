@@ -321,6 +321,12 @@ class Core {
     if (!floats(ready.pressure, answer.pressure_pa.data())) return false;
     answer.shear_pa.resize(ready.shear.bytes / 4);
     if (!floats(ready.shear, answer.shear_pa.data())) return false;
+    answer.error_estimate = {};
+    if (ready.error_estimate.there) {
+      std::array<float, 4> errors{};
+      if (ready.error_estimate.bytes != sizeof errors || !floats(ready.error_estimate, errors.data())) return false;
+      answer.error_estimate = {errors[0], errors[1], errors[2], errors[3]};
+    }
     if (!read_spikes(bytes, size, ready.spikes, header.client_time_us, answer)) return false;
     answer.vertices.resize(ready.vertices.bytes / sample_bytes(header.sample_type));
     if (ready.vertices.offset + ready.vertices.bytes > size) return false;

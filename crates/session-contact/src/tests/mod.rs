@@ -69,7 +69,10 @@ impl Plane {
     fn hand(&self, hello: &Hello) -> Result<Hand, Problem> {
         let Self { atlas, raster, model, pixels, interface } = self;
         let (model, pixels, interface) = (Some(model), Some(pixels), Some(interface));
-        Hand::of(hello, Skin { atlas, raster, model, pixels, interface, errors: None })
+        Hand::of(
+            hello,
+            Skin { atlas, raster, model, pixels, interface, errors: None, model_sha256: None },
+        )
     }
 }
 
@@ -376,7 +379,7 @@ fn without_a_name_the_most_accurate_method_serves() {
     let (model, interface) = (Some(model), Some(interface));
     let with = |hello: &Hello, has_layers: bool, errors| {
         let pixels = has_layers.then_some(pixels);
-        let skin = Skin { atlas, raster, model, pixels, interface, errors };
+        let skin = Skin { atlas, raster, model, pixels, interface, errors, model_sha256: None };
         let hand = Hand::of(hello, skin).expect("a hand");
         let told = hand.warnings().iter().map(|warning| {
             assert_eq!(warning.member, "method");
@@ -624,7 +627,7 @@ fn a_hello_that_nobody_waits_for_is_not_worked_out() {
     let plane = Plane::new();
     let Plane { atlas, raster, model, pixels, interface } = &plane;
     let (model, pixels, interface) = (Some(model), Some(pixels), Some(interface));
-    let skin = Skin { atlas, raster, model, pixels, interface, errors: None };
+    let skin = Skin { atlas, raster, model, pixels, interface, errors: None, model_sha256: None };
     let shape = AnnouncedShape::Mesh(Mesh {
         vertices_mm: vec![[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]],
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],

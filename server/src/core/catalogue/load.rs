@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use papilla_engine::{
     Backend, Card, Choice, Ladder, Model,
     card::Index,
+    error_law::ErrorLaws,
     ladder::{Kind, SET_NAMES},
     load_with,
 };
@@ -40,6 +41,29 @@ pub(super) fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<
         fresh
     });
     Ok(ladder)
+}
+
+/// Reads the laws of errors; those of another atlas are passed over.
+pub(super) fn load_error_laws(
+    json: &[u8],
+    atlas: &Atlas,
+    tiers: &[Tier],
+) -> Result<Option<ErrorLaws>, String> {
+    let laws = ErrorLaws::from_json(text(json)?).map_err(|error| error.to_string())?;
+    if laws.atlas_hash != atlas.hash() {
+        tracing::warn!(
+            calibrated = %laws.atlas_hash,
+            ours = %atlas.hash(),
+            "errors.json is of another atlas; answers tell nothing of their errors"
+        );
+        return Ok(None);
+    }
+    for of in &laws.networks {
+        if tiers.iter().any(|tier| tier.name == of.name && tier.onnx_sha256 != of.onnx_sha256) {
+            tracing::warn!(tier = %of.name, "errors.json is of another file; calibrate it anew");
+        }
+    }
+    Ok(Some(laws))
 }
 
 /// The shipped time of a tier, ms, in what runs it here.

@@ -14,7 +14,7 @@ use std::{borrow::Cow, sync::Arc};
 
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
-use papilla_engine::card::Index;
+use papilla_engine::{card::Index, error_law::ErrorLaws};
 use papilla_metrics::{TIERS_MAX, TierLabels};
 use papilla_proto::{
     ErrorCode, Problem,
@@ -26,8 +26,8 @@ use papilla_render::SkinPixels;
 use papilla_session_effects as effects;
 
 use self::{
-    assets::Assets,
-    load::{TierFiles, judge, load_ladder, require_atlas, text},
+    assets::{Assets, ERROR_LAWS},
+    load::{TierFiles, judge, load_error_laws, load_ladder, require_atlas, text},
     replay::Replay,
 };
 pub(crate) use self::{
@@ -86,6 +86,8 @@ pub(crate) struct Catalogue {
     pub(crate) replay: Replay,
     /// All rungs as shipped, FE included, as JSON; `null` if the folder has no `ladder.json`.
     pub(crate) ladder_json: String,
+    /// By what the errors of answers are told; none: the folder has no `errors.json` of this atlas.
+    pub(crate) error_laws: Option<ErrorLaws>,
     /// The set by which tiers are compared; none: each by its card.
     pub(crate) judged_on: Option<String>,
     pub(crate) overhead: Overhead,
@@ -117,6 +119,7 @@ impl Catalogue {
             atlas,
             replay: Replay::default(),
             ladder_json: "null".to_owned(),
+            error_laws: None,
             judged_on: None,
             overhead: Overhead::default(),
             runtime: effects::Shared::default(),
@@ -212,6 +215,10 @@ impl Catalogue {
         };
         let judged_on = judge(&mut tiers, ladder.as_ref());
         let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
+        let error_laws = match assets.get(ERROR_LAWS) {
+            Some(json) => load_error_laws(json, &atlas, &tiers).map_err(|e| bad(ERROR_LAWS, &e))?,
+            None => None,
+        };
         let overhead = Overhead::default();
         Ok(Self {
             name: DEFAULT_FINGER.to_owned(),
@@ -225,6 +232,7 @@ impl Catalogue {
             interface,
             replay,
             ladder_json,
+            error_laws,
             judged_on,
             overhead,
             runtime: effects::Shared::default(),

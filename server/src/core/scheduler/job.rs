@@ -8,7 +8,7 @@ use std::{
 use bytes::{Bytes, BytesMut};
 use papilla_codec::{Input, Output};
 use papilla_metrics::Stage;
-use papilla_proto::{FrameHeader, Problem, Window, effects::OutOfRange};
+use papilla_proto::{ErrorEstimate, FrameHeader, Problem, Window, effects::OutOfRange};
 use papilla_session_contact::Finger;
 use papilla_session_effects::Effects;
 
@@ -105,11 +105,13 @@ pub(crate) struct OutputMeta {
     pub(crate) window: Window,
     /// Bits of [`papilla_proto::flags`].
     pub(crate) flags: u8,
+    /// How wrong it is likely to be.
+    pub(crate) errors: ErrorEstimate,
 }
 
 impl Default for OutputMeta {
     fn default() -> Self {
-        Self { window: Window::WHOLE, flags: 0 }
+        Self { window: Window::WHOLE, flags: 0, errors: ErrorEstimate::default() }
     }
 }
 

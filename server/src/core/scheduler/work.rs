@@ -10,8 +10,10 @@ use std::{
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
 use papilla_engine::{EngineError, processor_time};
 use papilla_metrics::{Metrics, Stage};
-use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem, flags};
-use papilla_render::{Known, Maps, Read, Rendering, require_finite};
+use papilla_proto::{ERROR_ESTIMATE_LEN, ErrorCode, MapSummary, PressureRange, Problem, flags};
+use papilla_render::{
+    Known, KnownErrors, Maps, Read, Rendering, Source, require_finite, source_of,
+};
 use papilla_session_contact::{Finger, Frame};
 
 use super::{
@@ -159,11 +161,11 @@ impl Worker {
         // Without anything that shows SED, poses go in and forces come out.
         let shows_sed = finger.is_none() || effects.as_ref().is_none_or(|e| e.shows_sed());
         let is_tracked = options.header.is_none_or(|header| header.is_tracked());
-        let (summary, range) = if !is_tracked {
+        let (summary, range, source) = if !is_tracked {
             let (maps, finger) = (&mut self.maps, finger.as_deref_mut());
             let (summary, flags) = papilla_render::lose(maps, finger, effects.as_deref_mut());
             meta.flags |= flags;
-            (summary, self.range(job))
+            (summary, self.range(job), Source::Other)
         } else if let Some(finger) = &mut finger {
             self.take(job, finger, &payload, shows_sed, meta)?
         } else {
@@ -174,12 +176,19 @@ impl Worker {
         let OfFinger { catalogue, sessions } = &mut self.fingers[of];
         let tier = &catalogue.tiers[place];
         let &JobOptions { headroom, time_us, .. } = options;
+        // Posted maps have headers for it.
+        let tells_error = finger.as_ref().is_none_or(|finger| finger.tells_error());
         let known = Known {
             skin: &catalogue.skin_pixels,
             input_max: tier.input_statistics_max,
             response_max_per_mpa: tier.response_max_per_mpa,
+            errors: catalogue.error_laws.as_ref().filter(|_| tells_error).map(|laws| KnownErrors {
+                laws,
+                // What another finger trained errs otherwise on this one.
+                onnx_sha256: tier.trained_on.is_none().then_some(&tier.onnx_sha256),
+            }),
         };
-        let read = Read { summary, range, time_us, is_tracked, shows_sed };
+        let read = Read { summary, range, time_us, is_tracked, shows_sed, source };
         let (finger_here, effects_here) = (finger.as_deref_mut(), effects.as_deref_mut());
         let mut rendering =
             Rendering::begin(&mut self.maps, finger_here, effects_here, known, read);
@@ -216,15 +225,19 @@ impl Worker {
         }
         meta.flags |= rendering.flags();
         let start = Instant::now();
+        meta.errors = rendering.error_estimate();
         let corrects = "the drive of the actuators cannot be corrected";
         rendering.end(session).map_err(of_network(corrects))?;
-        let extra = finger.as_ref().map_or(0, |finger| finger.sections_len());
+        let extra = finger.as_ref().map_or(0, |finger| finger.sections_len() + ERROR_ESTIMATE_LEN);
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint() + extra);
             buffer.resize(headroom, 0);
             if let Some(finger) = &mut finger {
                 finger.write(buffer);
                 require_finite(&buffer[headroom..])?;
+                if finger.tells_error() {
+                    buffer.extend_from_slice(&meta.errors.encode());
+                }
             }
             let Maps { pressure_pa, sed_j_per_m3: sed, .. } = &self.maps;
             let written = effects
@@ -239,6 +252,9 @@ impl Worker {
             if let Some(finger) = &mut finger {
                 finger.write(buffer);
                 require_finite(&buffer[headroom..])?;
+                if finger.tells_error() {
+                    buffer.extend_from_slice(&meta.errors.encode());
+                }
             }
             let map = Map {
                 quantity: Quantity::Sed,
@@ -264,12 +280,12 @@ impl Worker {
         payload: &[u8],
         shows_sed: bool,
         meta: &mut OutputMeta,
-    ) -> Result<(MapSummary, PressureRange), Problem> {
+    ) -> Result<(MapSummary, PressureRange, Source), Problem> {
         if finger.reads_windows() {
             decode(job.input, payload, &mut self.maps.pressure_pa)?;
             let (of, range) = (places(job.tier).0, self.range(job));
             let skin = &self.fingers[of].catalogue.skin_pixels;
-            return Ok((self.maps.check_of(finger, range, skin)?, range));
+            return Ok((self.maps.check_of(finger, range, skin)?, range, Source::Map));
         }
         let Input::Window { sample_type, scale, .. } = job.input else {
             return Err(Problem::new(ErrorCode::Internal, "a frame that is no window"));
@@ -281,7 +297,7 @@ impl Worker {
         if let Some(iterations) = taken.iterations {
             self.metrics.contact.solved(taken.flags, iterations);
         }
-        Ok((MapSummary { peak_pa: taken.peak_pa }, range))
+        Ok((MapSummary { peak_pa: taken.peak_pa }, range, source_of(&taken)))
     }
 
     fn range(&self, job: &Job) -> PressureRange {
@@ -297,10 +313,11 @@ impl Worker {
         &mut self,
         job: &Job,
         payload: &[u8],
-    ) -> Result<(MapSummary, PressureRange), Problem> {
+    ) -> Result<(MapSummary, PressureRange, Source), Problem> {
         decode(job.input, payload, &mut self.maps.pressure_pa)?;
         let (finger, range) = (places(job.tier).0, self.range(job));
-        Ok((self.maps.check(range, &self.fingers[finger].catalogue.skin_pixels)?, range))
+        let skin = &self.fingers[finger].catalogue.skin_pixels;
+        Ok((self.maps.check(range, skin)?, range, Source::Map))
     }
 }
 

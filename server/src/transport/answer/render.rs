@@ -8,7 +8,7 @@ use axum::{
 };
 use bytes::BytesMut;
 use papilla_metrics::{Stage, Transport};
-use papilla_proto::{ErrorCode, Problem, flags};
+use papilla_proto::{ErrorCode, LikelyError, Problem, flags};
 use tokio::{sync::mpsc, time::timeout};
 
 use crate::{
@@ -51,6 +51,8 @@ pub(crate) struct Timings {
     times: [Duration; 3],
     /// Bits of [`papilla_proto::flags`].
     flags: u8,
+    /// What the map is likely to err.
+    sed_error: LikelyError,
 }
 
 /// Renders one posted map. The caller holds a place, which bounds the queue.
@@ -82,7 +84,9 @@ pub(crate) async fn through_pool(
             app.metrics.tier(done.tier).total.observe(total);
             let times = [done.times.queue, done.times.infer, total];
             telemetry::rendered(&app.tier_name(done.tier), times);
-            Ok(Rendered { bytes, scale, timings: Timings { times, flags: done.meta.flags } })
+            let sed_error = done.meta.errors.sed;
+            let timings = Timings { times, flags: done.meta.flags, sed_error };
+            Ok(Rendered { bytes, scale, timings })
         }
     }
 }
@@ -110,6 +114,15 @@ impl Timings {
         for (name, time) in names.into_iter().zip(self.times) {
             let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
             headers.insert(HeaderName::from_static(name), HeaderValue::from(us));
+        }
+        if self.sed_error.is_stated() {
+            let LikelyError { median, p90 } = self.sed_error;
+            let names = ["x-papilla-sed-error-median", "x-papilla-sed-error-p90"];
+            for (name, error) in names.into_iter().zip([median, p90]) {
+                if let Ok(error) = HeaderValue::from_str(&error.to_string()) {
+                    headers.insert(HeaderName::from_static(name), error);
+                }
+            }
         }
         for (_, name) in flags::NAMED.into_iter().filter(|(bit, _)| self.flags & bit != 0) {
             headers.append("x-papilla-flags", HeaderValue::from_static(name));

@@ -12,12 +12,14 @@ use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tower_http::cors::{AllowPrivateNetwork, CorsLayer};
 
 /// Headers of an answer that a page may read.
-const EXPOSED: [&str; 9] = [
+const EXPOSED: [&str; 11] = [
     "x-papilla-tier",
     "x-papilla-queue-us",
     "x-papilla-infer-us",
     "x-papilla-total-us",
     "x-papilla-flags",
+    "x-papilla-sed-error-median",
+    "x-papilla-sed-error-p90",
     "x-sed-max-j-per-m3",
     "x-pressure-max-pa",
     "inference-header-content-length",

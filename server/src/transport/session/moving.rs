@@ -45,6 +45,7 @@ impl Shape {
             answer_layout: None,
             pressure: None,
             displacement: None,
+            error_estimate: None,
             ..hello.clone()
         };
         // A hello that came as JSON goes as JSON.

@@ -200,6 +200,7 @@ fn skin(Loaded { catalogue, contact }: &Loaded) -> Skin<'_> {
         pixels: contact.and_then(|contact| contact.pixels.as_ref()),
         interface: contact.and_then(|contact| contact.interface.as_ref()),
         errors: contact.and_then(|contact| contact.errors.as_ref()),
+        model_sha256: contact.map(|contact| contact.sha256.as_str()),
     }
 }
 

@@ -113,6 +113,10 @@ static func read_sections(answer, packet, sections):
 			answer.point_rates_hz = Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
 		elif section.name == "vertices":
 			answer.vertices = Samples.decode(packet.subarray(from, from + int(section.bytes) - 1), answer.sample_type, answer.scale)
+		elif section.name == "error_estimate":
+			# How wrong this answer is likely to be, relative to finite elements; what is not stated is infinite.
+			var errors = Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
+			answer.error_estimate = {"sed_median": errors[0], "sed_p90": errors[1], "force_median": errors[2], "force_p90": errors[3]}
 		elif section.name == "touch":
 			answer.touch = Touch.read(Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1)))
 		else:

@@ -14,7 +14,7 @@ use papilla_engine::card::Index;
 use papilla_proto::json;
 
 use super::{
-    CONTACT, CONTACT_ERRORS, FINGER, Files,
+    CONTACT, CONTACT_ERRORS, ERROR_LAWS, FINGER, Files,
     detached::{STRANDED_MAX, Unfinished, detached},
 };
 use crate::StartError;
@@ -27,8 +27,16 @@ pub(super) const FOLDER_BYTES_MAX: u64 = 1 << 30;
 const WAIT_MAX: Duration = Duration::from_secs(20);
 
 /// The files of every service; an index names the models beside them.
-const BASE: [&str; 7] =
-    ["index.json", "atlas.json", "replay.json", "ladder.json", CONTACT, CONTACT_ERRORS, FINGER];
+const BASE: [&str; 8] = [
+    "index.json",
+    "atlas.json",
+    "replay.json",
+    "ladder.json",
+    CONTACT,
+    CONTACT_ERRORS,
+    ERROR_LAWS,
+    FINGER,
+];
 
 /// What there is in a folder.
 #[derive(Debug)]

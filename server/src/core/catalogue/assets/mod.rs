@@ -19,6 +19,9 @@ pub(crate) const FINGER_FILES_BYTES_MAX: u64 = 256 << 20;
 /// What methods err with it.
 pub(crate) const CONTACT_ERRORS: &str = "contact.json";
 
+/// By what the errors of answers are told.
+pub(crate) const ERROR_LAWS: &str = "errors.json";
+
 /// The shipped models, cards, atlas, replay and contact model, as they were when the binary was built.
 const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
