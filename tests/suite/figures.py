@@ -116,8 +116,10 @@ def differing(model: str, known: dict[str, str]) -> list[str]:
             for quantity, member in QUANTITIES.items():
                 for suffix, value in [("", errors[member]["median"]), (".p95", errors[member]["p95"])]:
                     due = known.get(f"{key}.{quantity}{suffix}")
-                    if percent(value) != due:
-                        faults.append(f"models/contact.json: {key}.{quantity}{suffix} is {percent(value)}, the report says {due}")
+                    # The report has a tenth of a per cent.
+                    found = percent(round(100 * value, 1) / 100)
+                    if found != due:
+                        faults.append(f"models/contact.json: {key}.{quantity}{suffix} is {found}, the report says {due}")
     return faults
 
 
