@@ -77,7 +77,7 @@ class Page {
     this.hard = new HardCases(atlas, this.contact !== null, () => this.mostPa, () => this.answered.tier || null);
     this.session = this.#makeSession();
     this.hand = this.contact && new HandView(atlas, this.press, {
-      terms: () => ({ ...this.#terms(), effects: [], ...(byId('method').value && { method: byId('method').value }) }),
+      terms: () => ({ ...this.#terms(), effects: [], error_estimate: false, ...(byId('method').value && { method: byId('method').value }) }),
       told: (ready) => this.#handReady(ready),
       notify: (message) => notify(message),
       answered: (forceN, sedPeak, serverMs) => {
@@ -160,7 +160,7 @@ class Page {
 
   /** What is asked for, whatever the frames are. */
   #terms() {
-    return { tier: byId('tier').value || null, budget_us: Number(byId('budget').value), atlas_hash: this.atlas.hash, ...this.effects.hello(Array.from(this.press.uvPx)) };
+    return { tier: byId('tier').value || null, budget_us: Number(byId('budget').value), atlas_hash: this.atlas.hash, error_estimate: true, ...this.effects.hello(Array.from(this.press.uvPx)) };
   }
 
   /** Whether the server finds the pressure of this press. */
@@ -348,7 +348,7 @@ class Page {
     for (const name of ['other', 'difference']) this.views[name].isShown = what !== '' || this.mode === 'replay';
     const [kind, name] = what.split(':');
     const { atlas_hash: atlasHash } = this.#terms();
-    const hello = { atlas_hash: atlasHash, budget_us: 500000 };
+    const hello = { atlas_hash: atlasHash, budget_us: 500000, error_estimate: true };
     if (kind === 'tier') Object.assign(hello, { tier: name });
     else if (kind === 'method') Object.assign(hello, { tier: byId('tier').value || this.answered.tier || null, ...this.contact.terms(name) });
     this.comparison.choose(what, hello);

@@ -32,7 +32,7 @@ const python = (value) => JSON.stringify(value).replace(/\btrue\b/g, 'True').rep
 
 /** The press as a program with the Python client. */
 export function pythonOf({ origin, terms, pose }) {
-  const names = Object.entries(terms).filter(([name, value]) => !['atlas_hash', 'sample_type'].includes(name) && value !== null && !(Array.isArray(value) && value.length === 0));
+  const names = Object.entries(terms).filter(([name, value]) => !['atlas_hash', 'sample_type', 'error_estimate'].includes(name) && value !== null && !(Array.isArray(value) && value.length === 0));
   const lines = names.map(([name, value]) => `    ${name}=${python(value)},`);
   return `import papilla
 

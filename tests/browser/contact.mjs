@@ -149,6 +149,30 @@ test('the finger is drawn as the service moved it: out of the object, and round 
   await settled();
 });
 
+test('an answer says how wrong it is likely to be, where that is known', async () => {
+  const said = (pattern, id = 'sed-sure') => until(([source, of]) => new RegExp(source, 'u').test(document.getElementById(of).textContent), [pattern.source, id]);
+  await chooseRadio('shape', 'sphere');
+  await page.fill('#size', '8');
+  await page.fill('#depth', '1');
+  await settled();
+  await said(/^expected error [\d.]+ %; 9 in 10 such answers below [\d.]+ %$/);
+  const [typical, bound, wide] = await page.evaluate(() => ['b', 'i', '.sure-bar'].map((name) => document.querySelector(`#sed-sure ${name}`).closest('.sure').querySelector(name).getBoundingClientRect().width));
+  assert.ok(typical > 0 && typical < bound && bound <= wide, `${typical} ${bound} ${wide}`);
+  await page.selectOption('#with', 'tier:pico');
+  await said(/^expected error/, 'other-sure');
+  await page.selectOption('#with', '');
+  await chooseRadio('shape', 'wedge');
+  await page.fill('#depth', '2');
+  await said(/^expected error: unknown for such a press$/);
+  await page.focus('#pad');
+  await page.keyboard.press('Escape');
+  await until(() => document.getElementById('sed-sure').hidden);
+  await page.keyboard.press(' ');
+  await chooseRadio('shape', 'sphere');
+  await page.fill('#depth', '1.4');
+  await settled();
+});
+
 test('replay sends maps as ever, and a press is solved again after it', async () => {
   await chooseRadio('mode', 'replay');
   await until(() => globalThis.papilla.session.ready && !globalThis.papilla.session.ready.method && globalThis.papilla.replay.judged);
