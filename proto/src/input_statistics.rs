@@ -494,7 +494,8 @@ mod tests {
             }
             for (found, side) in look.spread_px.into_iter().zip([60.0_f32, 12.0]) {
                 let due = side / 12.0_f32.sqrt();
-                assert!((found / due - 1.0).abs() < 0.05, "{look:?} at {degrees} degrees");
+                // A side is drawn up to a pixel too short.
+                assert!((found - due).abs() < 0.35, "{look:?} at {degrees} degrees, {due} is due");
             }
             assert_eq!(look.statistics, InputStatistics::of(&bar(degrees, centre)));
         }
