@@ -104,7 +104,8 @@ fn measure(
                 None => solver.solve(std::slice::from_ref(object), &mut out),
             }?;
             let us = processor_us() - began;
-            Ok::<_, Box<dyn Error>>((us, out.force_n != [0.0; 3], out.quality.settled))
+            let touches = out.force_n.iter().any(|force| *force != 0.0);
+            Ok::<_, Box<dyn Error>>((us, touches, out.quality.settled))
         };
         let (first, touches, _) = frame(&object)?;
         if !touches {
