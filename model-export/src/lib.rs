@@ -28,6 +28,7 @@ pub mod contact;
 pub mod dataset;
 mod error;
 pub mod evaluate;
+pub mod friction;
 pub mod ladder;
 pub mod metrics;
 pub mod part;

@@ -15,7 +15,7 @@ use papilla_session_contact::{Skin, contact_errors, model_sha256};
 
 use crate::{
     LoadError,
-    model::{read, read_text},
+    folder::{read, read_text},
 };
 
 /// File of the contact model in a bundle.

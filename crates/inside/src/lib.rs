@@ -23,6 +23,7 @@
 mod bundle;
 mod contact;
 mod feel;
+mod folder;
 mod hello;
 mod model;
 mod session;
@@ -30,7 +31,8 @@ mod session;
 pub use bundle::Bundle;
 pub use contact::{Contact, Solved};
 pub use feel::Feel;
+pub use folder::LoadError;
 pub use hello::read_hello;
-pub use model::{LoadError, Model};
+pub use model::Model;
 pub use papilla_proto::Problem;
 pub use session::{Frame, Made, Session};

@@ -3,8 +3,9 @@
 use super::{load_model, print_json};
 use papilla_engine::Backend;
 use papilla_model_export::ExportError;
-use papilla_model_export::contact::{Models, RUBBING, Rubbed, measure_friction};
+use papilla_model_export::contact::Models;
 use papilla_model_export::dataset::Dataset;
+use papilla_model_export::friction::{RUBBING, Rubbed, measure};
 use papilla_progress::Progress;
 use std::path::PathBuf;
 
@@ -31,7 +32,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         let dataset = Dataset::open(folder)?;
         models.require_atlas(&dataset, folder)?;
         for rung in RUBBING {
-            rows.push(measure_friction(&models, rung, &dataset, session.as_mut())?);
+            rows.push(measure(&models, rung, &dataset, session.as_mut())?);
             progress.inc();
         }
     }

@@ -1,11 +1,9 @@
 //! The contact ladder: from where things are to pressure, force and SED, against FE, and what that
 //! takes.
 
-mod friction;
 mod maps;
 mod placed;
 
-pub use self::friction::{RUBBING, Rubbed, measure as measure_friction};
 pub use self::maps::ContactMaps;
 pub(crate) use self::placed::Placed;
 use crate::dataset::Dataset;
@@ -145,7 +143,7 @@ pub fn errors_of(model: &[u8], network: Option<String>, rows: &[Row]) -> Contact
 
 /// The two models that rungs are of.
 pub struct Models {
-    finger: Arc<ContactModel>,
+    pub(crate) finger: Arc<ContactModel>,
     half_space: Arc<ContactModel>,
 }
 

@@ -46,7 +46,7 @@ impl Placed {
     }
 
     /// Its way in, a unit vector.
-    pub(super) fn direction(&self) -> [f64; 3] {
+    pub(crate) fn direction(&self) -> [f64; 3] {
         self.direction
     }
 

@@ -178,7 +178,7 @@ pub struct Hello {
     pub force_target: Option<bool>,
     /// Whether answers tell how wrong they are likely to be: the section
     /// [`ErrorEstimate`](crate::ErrorEstimate).
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error_estimate: Option<bool>,
     /// Whether answers tell the local stiffness.
     #[serde(default, skip_serializing_if = "Option::is_none")]

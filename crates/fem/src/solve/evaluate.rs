@@ -91,7 +91,13 @@ pub fn evaluate_body(
     let mut reference = contact(problem, loading, trial, tangent.as_deref_mut(), out);
     let share = loading.share(trial.load_fraction);
     if let Some(pressure) = &loading.pressure {
-        reference += pressure.add(problem, trial.u, share, tangent, out);
+        let acting = pressure.add(problem, trial.u, share, tangent, &mut out.residual_n);
+        out.potential_mj -= acting.work_mj;
+        for i in 0..3 {
+            out.contact_force_n[i] += acting.force_n[i];
+            out.normal_force_n[i] += acting.force_n[i];
+        }
+        reference += acting.square;
     }
     for (node, f) in loading.dead_n.iter().enumerate() {
         for i in 0..3 {

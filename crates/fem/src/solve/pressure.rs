@@ -5,7 +5,6 @@
 //! surface ends; the tangent takes the symmetric part, which finds the same equilibrium in a few
 //! more iterations (Schweizerhof & Ramm 1984).
 
-use super::evaluate::Evaluation;
 use super::problem::Problem;
 use crate::linear::SymmetricMatrix;
 use crate::mesh::Mesh;
@@ -18,6 +17,16 @@ const GAUSS_2: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134
 #[derive(Clone, Debug)]
 pub struct SurfacePressure {
     faces: Vec<LoadedFace>,
+}
+
+/// What a share of the pressure comes to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Acting {
+    /// Sum of its forces, N, and of their squares at the nodes, N2.
+    pub force_n: [f64; 3],
+    pub square: f64,
+    /// Work on the straight way from rest, mJ.
+    pub work_mj: f64,
 }
 
 /// A face, and the element that it is a side of.
@@ -167,45 +176,38 @@ impl SurfacePressure {
         sum
     }
 
-    /// Adds a share of the pressure; returns the square of its force norm.
+    /// Takes the forces of a share of the pressure from the residual (N), and adds its tangent.
     pub(super) fn add(
         &self,
         problem: &Problem,
         u: &[[f64; 3]],
         share: f64,
         tangent: Option<&mut SymmetricMatrix>,
-        out: &mut Evaluation,
-    ) -> f64 {
+        residual_n: &mut [f64],
+    ) -> Acting {
         let mesh = &problem.mesh;
-        let mut square = 0.0;
-        let mut total = [0.0; 3];
+        let mut acting = Acting::default();
         self.forces(mesh, u, 1.0, &mut |node, force| {
             for i in 0..3 {
                 let f = share * force[i];
-                out.residual_n[3 * node as usize + i] -= f;
-                total[i] += f;
-                square += f * f;
+                residual_n[3 * node as usize + i] -= f;
+                acting.force_n[i] += f;
+                acting.square += f * f;
             }
         });
         // The work on the straight way from rest is the potential where there is one.
-        let mut potential = 0.0;
         for (s, weight) in GAUSS_2 {
             self.forces(mesh, u, s, &mut |node, force| {
                 let u = u[node as usize];
-                potential += weight * share * (0..3).map(|i| force[i] * u[i]).sum::<f64>();
+                acting.work_mj += weight * share * (0..3).map(|i| force[i] * u[i]).sum::<f64>();
             });
-        }
-        out.potential_mj -= potential;
-        for i in 0..3 {
-            out.contact_force_n[i] += total[i];
-            out.normal_force_n[i] += total[i];
         }
         if let Some(tangent) = tangent {
             for face in &self.faces {
                 face.stiffen(problem, u, share, tangent);
             }
         }
-        square
+        acting
     }
 }
 

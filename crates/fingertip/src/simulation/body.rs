@@ -1,6 +1,5 @@
 //! A body pressed by a rigid plate: set-up, pose, and vertex values.
 
-use super::pressed::Under;
 use super::record::IncrementRecord;
 use crate::geometry::fingertip::FingertipShapeError;
 use crate::indenter::IndenterError;
@@ -21,11 +20,12 @@ use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::mesh::sample::Deformed;
 use papilla_fem::solve::{
     Materials, Options, Problem, ProblemError, SnapshotError, SolveError, Solver, StepReport,
-    SurfacePressureError,
+    SurfacePressure, SurfacePressureError,
 };
 use papilla_sdf::Placement;
 use papilla_solid::tensor::{norm, product};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Why a body could not be set up or pressed.
 #[derive(Debug, thiserror::Error)]
@@ -172,6 +172,14 @@ impl SimulationError {
             None => self,
         }
     }
+}
+
+/// Pressure that acts on a body.
+pub struct Under {
+    /// As the solver takes it.
+    pub pressure: Arc<SurfacePressure>,
+    /// The whole of it at each node of the mesh, MPa.
+    pub nodal_mpa: Vec<f64>,
 }
 
 /// A body ready to be pressed, shared by every indentation of a campaign.

@@ -1,6 +1,6 @@
 //! A finger under a given pressure, in place of an indenter.
 
-use super::body::{Body, SimulationError};
+use super::body::{Body, SimulationError, Under};
 use super::drive::Watch;
 use super::fields::PA_PER_MPA;
 use super::record::IncrementRecord;
@@ -16,14 +16,6 @@ use papilla_solid::tensor::norm;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// Pressure that acts on a body.
-pub struct Under {
-    /// As the solver takes it.
-    pub pressure: Arc<SurfacePressure>,
-    /// The whole of it at each node of the mesh, MPa.
-    pub nodal_mpa: Vec<f64>,
-}
 
 /// Share of the pressure from one equilibrium to the next.
 const STEP_MAX: f64 = 0.125;

@@ -1,9 +1,8 @@
 //! Friction: from where an indenter is, on its way there, to force, traction and SED, against FE with
 //! friction.
 
-use super::{Models, Rung, pixel_contact};
 use crate::ExportError;
-use crate::contact::placed::Placed;
+use crate::contact::{Models, Placed, Rung, pixel_contact};
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile};
 use crate::shear::traction;
