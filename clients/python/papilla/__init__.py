@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import actuators, afferents, devices, fe, frames, hjif, meshes, sensors
     from .aio import AsyncSession
-    from .answer import Answer, Problem, Spikes, Summary, Touch
+    from .answer import Answer, ErrorEstimate, Problem, Spikes, Summary, Touch
     from .atlas import Atlas, Contact
     from .errors import (
         BadAddress,
@@ -113,7 +113,7 @@ __all__ = [
 # does not wait for WebSockets, and one that opens a session not for files.
 _NAMES = {
     "aio": ("AsyncSession",),
-    "answer": ("Answer", "Problem", "Spikes", "Summary", "Touch"),
+    "answer": ("Answer", "ErrorEstimate", "Problem", "Spikes", "Summary", "Touch"),
     "atlas": ("Atlas", "Contact"),
     "errors": (
         "BadAddress",
