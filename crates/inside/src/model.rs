@@ -1,7 +1,6 @@
 //! A folder of models: a finger and one network.
 
 use std::{
-    io,
     path::{Path, PathBuf},
     sync::Arc,
 };
