@@ -204,7 +204,9 @@ test('a second model answers the same contact, and the difference is of that pai
   await until(() => globalThis.papilla.comparison.session.ready?.method === 'springs');
   await until(() => /contact and model/.test(document.getElementById('other-ms').textContent));
   await page.selectOption('#with', '');
-  assert.equal(await page.locator('#other').isVisible(), false);
+  assert.equal(await page.locator('#other .stack').isVisible(), false);
+  // Who compares with nothing may choose again.
+  assert.equal(await page.locator('#with').isVisible(), true);
 });
 
 test('an effect is computed only while it is switched on, and says what it brought', async () => {
