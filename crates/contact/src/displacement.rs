@@ -1,9 +1,9 @@
 //! How far what presses moves the skin: all of it, not only what lies near the contact.
 
 use crate::answer::Contact;
-use crate::kernels::{DisplaceTiles, Vectors, run};
 use crate::model::ContactModel;
 use crate::pixels::PixelContact;
+use crate::push::Push;
 use crate::second_order::Amplitudes;
 use crate::solver::Solver;
 use std::sync::Arc;
@@ -15,14 +15,9 @@ pub struct Displacement {
     amplitudes: Option<Amplitudes>,
     /// By vertex, N.
     force_n: [Vec<f32>; 3],
-    /// Vertices under force, and their forces one after the other.
-    pushed: Vec<u32>,
-    packed: [Vec<f32>; 3],
-    /// Tiles of the compliance: those under force, and all.
-    pushing: Vec<u32>,
+    push: Push,
+    /// All tiles of the compliance.
     tiles: Vec<u32>,
-    tile_force: Vec<Vectors>,
-    tile_moved: Vec<Vectors>,
     /// By vertex, mm: of first order, and in all.
     vertices: Vec<u32>,
     linear: [Vec<f32>; 3],
@@ -34,18 +29,14 @@ impl Displacement {
     #[must_use]
     pub fn new(solver: &Solver) -> Self {
         let model = Arc::clone(&solver.model);
-        let (v, tiles) = (model.vertices(), model.compliance.side());
+        let v = model.vertices();
         let zeros = || std::array::from_fn(|_| vec![0.0; v]);
         let second_order = model.second_order.as_ref().filter(|_| solver.has_second_order());
         Self {
             amplitudes: second_order.map(|s| s.amplitudes()),
             force_n: zeros(),
-            pushed: Vec::with_capacity(v),
-            packed: zeros(),
-            pushing: Vec::with_capacity(tiles),
-            tiles: (0..tiles as u32).collect(),
-            tile_force: vec![Vectors::default(); tiles],
-            tile_moved: vec![Vectors::default(); tiles],
+            push: Push::new(&model),
+            tiles: (0..model.compliance.side() as u32).collect(),
             vertices: (0..v as u32).collect(),
             linear: zeros(),
             moved: zeros(),
@@ -70,17 +61,10 @@ impl Displacement {
             Some(pixels) => pixels.forces(&mut self.force_n),
             None => solver.forces(&mut self.force_n),
         }
-        self.spread();
-        let Self { model, amplitudes, pushed, packed, linear, moved, vertices, .. } = self;
-        if let (Some(a), Some(s)) = (amplitudes, &model.second_order) {
-            let m = pushed.len();
-            s.evaluate(pushed, packed.each_ref().map(|f| &f[..m]), a);
-            s.displace(a, vertices, linear, moved);
-        } else {
-            for (moved, linear) in moved.iter_mut().zip(&*linear) {
-                moved.copy_from_slice(linear);
-            }
-        }
+        let Self { model, amplitudes, force_n, push, tiles, vertices, linear, moved } = self;
+        push.take(model, |vertex| [0, 1, 2].map(|i| force_n[i][vertex]));
+        push.displace(model, [tiles, vertices], linear);
+        push.add_second_order(model, amplitudes.as_mut(), vertices, linear, moved);
         if let Some(pixels) = pixels {
             pixels.moved_near(model, moved);
         }
@@ -89,42 +73,6 @@ impl Displacement {
         let length = strength * solver.person().width as f32;
         for (vertex, moved_mm) in moved_mm.iter_mut().enumerate() {
             *moved_mm = [0, 1, 2].map(|i| length * moved[i][vertex]);
-        }
-    }
-
-    /// The first order: compliance times forces.
-    fn spread(&mut self) {
-        let Self { model, force_n, pushed, packed, pushing, tile_force, .. } = self;
-        pushed.clear();
-        pushing.clear();
-        tile_force.fill(Vectors::default());
-        for vertex in 0..model.vertices() {
-            let force = [0, 1, 2].map(|i| force_n[i][vertex]);
-            if force.iter().all(|f| *f == 0.0) {
-                continue;
-            }
-            let [tile, place] = model.compliance.place(vertex);
-            for i in 0..3 {
-                packed[i][pushed.len()] = force[i];
-                tile_force[tile][i][place] = force[i];
-            }
-            pushed.push(vertex as u32);
-            if !pushing.contains(&(tile as u32)) {
-                pushing.push(tile as u32);
-            }
-        }
-        run(DisplaceTiles {
-            compliance: &model.compliance,
-            pushing,
-            force: tile_force,
-            moving: &self.tiles,
-            moved: &mut self.tile_moved,
-        });
-        for vertex in 0..self.model.vertices() {
-            let [tile, place] = self.model.compliance.place(vertex);
-            for (linear, moved) in self.linear.iter_mut().zip(&self.tile_moved[tile]) {
-                linear[vertex] = moved[place];
-            }
         }
     }
 }

@@ -52,6 +52,7 @@ mod objects;
 mod packed;
 mod patch;
 mod pixels;
+mod push;
 mod second_order;
 mod shear_energy;
 mod slopes;

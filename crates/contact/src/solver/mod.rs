@@ -186,19 +186,6 @@ impl Solver {
         &self.model
     }
 
-    /// Forces of objects along their normals on the skin's vertices after the last frame, N.
-    pub(crate) fn normal_forces(&self, force_n: &mut [Vec<f32>; 3]) {
-        let Slots { found, size, .. } = &self.patch.values;
-        force_n.iter_mut().for_each(|force| force.fill(0.0));
-        let friction = self.friction.as_ref().filter(|f| f.is_rough);
-        for slot in (0..self.patch.near()).filter(|slot| size[*slot] > 0.0) {
-            let shear = friction.map_or([0.0; 3], |f| f.shear_n(slot));
-            for i in 0..3 {
-                force_n[i][self.patch.vertices()[slot] as usize] = found[i][slot] - shear[i];
-            }
-        }
-    }
-
     /// Forces on the skin's vertices after the last frame, N.
     pub(crate) fn forces(&self, force_n: &mut [Vec<f32>; 3]) {
         let Slots { found, size, .. } = &self.patch.values;
@@ -208,6 +195,16 @@ impl Solver {
                 force[self.patch.vertices()[slot] as usize] = found[slot];
             }
         }
+    }
+
+    /// Forces of objects along their normals on the skin's vertices after the last frame, N.
+    pub(crate) fn normal_forces(&self, force_n: &mut [Vec<f32>; 3]) {
+        self.forces(force_n);
+        self.each_rubbed(|vertex, _, shear| {
+            for (force, shear) in force_n.iter_mut().zip(shear) {
+                force[vertex] -= shear;
+            }
+        });
     }
 
     /// Calls `note` with each vertex under force, the size of its normal force and its force along the skin,

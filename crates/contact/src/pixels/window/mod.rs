@@ -7,8 +7,8 @@ mod vertices;
 
 use super::convolution::Cells;
 use super::{PixelSkin, PixelSpacing};
-use crate::kernels::Vectors;
 use crate::model::ContactModel;
+use crate::push::Push;
 use papilla_atlas::MAP_SIDE_PX;
 
 /// Pixels of the map between the window and itself, where it repeats.
@@ -69,21 +69,14 @@ pub(super) struct Window {
     hat_mm2: Vec<f32>,
     hat_mpa: Vec<f32>,
     hat_n: Vec<f32>,
-    /// Vertices under force, and their forces.
-    touched: Vec<u32>,
-    packed: [Vec<f32>; 3],
-    /// Tiles of the compliance under force, and those that are displaced.
-    pushing: Vec<u32>,
-    is_pushing: Vec<bool>,
+    push: Push,
+    /// Tiles of the compliance that are displaced.
     moving: Vec<u32>,
-    tile_force: Vec<Vectors>,
-    tile_moved: Vec<Vectors>,
 }
 
 impl Window {
     pub(super) fn new(skin: &PixelSkin, model: &ContactModel, spacing: PixelSpacing) -> Self {
         let (pixels, vertices) = (skin.raster.pixel_count(), model.vertices());
-        let tiles = model.compliance.side();
         let mut solved_for = vec![0; pixels.div_ceil(64)];
         for (entry, index) in skin.raster.indices().iter().enumerate() {
             solved_for[entry / 64] |= u64::from(spacing.takes(*index)) << (entry % 64);
@@ -124,13 +117,8 @@ impl Window {
             hat_mm2: zeros(),
             hat_mpa: zeros(),
             hat_n: zeros(),
-            touched: Vec::with_capacity(vertices),
-            packed: vector(),
-            pushing: Vec::with_capacity(tiles),
-            is_pushing: vec![false; tiles],
+            push: Push::new(model),
             moving: Vec::with_capacity(vertices),
-            tile_force: vec![Vectors::default(); tiles],
-            tile_moved: vec![Vectors::default(); tiles],
         }
     }
 

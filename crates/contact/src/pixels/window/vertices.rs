@@ -1,7 +1,6 @@
 //! The vertices that move a window's pixels.
 
 use super::{NONE, Window};
-use crate::kernels::{DisplaceTiles, run};
 use crate::model::ContactModel;
 use crate::pixels::PixelSkin;
 use crate::second_order::Amplitudes;
@@ -15,32 +14,12 @@ impl Window {
         model: &ContactModel,
         amplitudes: Option<&mut Amplitudes>,
     ) {
-        self.spread_forces(model);
-        run(DisplaceTiles {
-            compliance: &model.compliance,
-            pushing: &self.pushing,
-            force: &self.tile_force,
-            moving: &self.moving,
-            moved: &mut self.tile_moved,
-        });
-        for (slot, id) in self.ids.iter().enumerate() {
-            let [tile, at] = model.compliance.place(*id as usize);
-            for (linear, moved) in self.linear.iter_mut().zip(&self.tile_moved[tile]) {
-                linear[slot] = moved[at];
-            }
-        }
+        let Self { push, force_n, shear_n, moving, ids, linear, .. } = self;
+        push.take(model, |vertex| [0, 1, 2].map(|i| force_n[i][vertex] + shear_n[i][vertex]));
+        push.displace(model, [moving, ids], linear);
         self.correct(skin, model);
-        if let (Some(a), Some(s)) = (amplitudes, &model.second_order) {
-            let m = self.touched.len();
-            let [x, y, z] = &self.packed;
-            s.evaluate(&self.touched, [&x[..m], &y[..m], &z[..m]], a);
-            s.displace(a, &self.ids, &self.linear, &mut self.moved);
-        } else {
-            let n = self.ids.len();
-            for (moved, linear) in self.moved.iter_mut().zip(&self.linear) {
-                moved[..n].copy_from_slice(&linear[..n]);
-            }
-        }
+        let Self { push, ids, linear, moved, .. } = self;
+        push.add_second_order(model, amplitudes, ids, linear, moved);
         for (slot, id) in self.ids.iter().enumerate() {
             let rest = model.positions_mm[*id as usize];
             for i in 0..3 {
@@ -84,37 +63,12 @@ impl Window {
         slots.next()
     }
 
-    /// Packs the vertices' forces, and puts them into the compliance's tiles.
-    fn spread_forces(&mut self, model: &ContactModel) {
-        for tile in self.pushing.drain(..) {
-            self.tile_force[tile as usize] = Default::default();
-            self.is_pushing[tile as usize] = false;
-        }
-        self.touched.clear();
-        for vertex in 0..model.vertices() {
-            let force = [0, 1, 2].map(|i| self.force_n[i][vertex] + self.shear_n[i][vertex]);
-            if force.iter().all(|f| *f == 0.0) {
-                continue;
-            }
-            let at = self.touched.len();
-            self.touched.push(vertex as u32);
-            let [tile, place] = model.compliance.place(vertex);
-            self.is_pushing[tile] = true;
-            for i in 0..3 {
-                self.packed[i][at] = force[i];
-                self.tile_force[tile][i][place] = force[i];
-            }
-        }
-        // In their order in memory, whichever came first.
-        let tiles = self.is_pushing.iter().enumerate().filter(|(_, is_pushing)| **is_pushing);
-        self.pushing.extend(tiles.map(|(tile, _)| tile as u32));
-    }
-
     /// Puts the skin's own dents in the place of the mesh's.
     fn correct(&mut self, skin: &PixelSkin, model: &ContactModel) {
-        for (k, vertex) in self.touched.iter().enumerate() {
+        let forces = self.push.forces();
+        for (k, vertex) in self.push.vertices().iter().enumerate() {
             let normal = model.normals[*vertex as usize];
-            let force: f32 = normal.iter().zip(&self.packed).map(|(n, f)| n * f[k]).sum();
+            let force: f32 = normal.iter().zip(forces).map(|(n, f)| n * f[k]).sum();
             let near = &skin.corrections[*vertex as usize];
             for (other, by) in near.vertices.iter().zip(near.weights) {
                 let slot = self.place[usize::from(*other)];
