@@ -57,6 +57,8 @@ impl Displacement {
             moved_mm.fill([0.0; 3]);
             return;
         }
+        // Where no pixel was near, vertices answered.
+        let pixels = pixels.filter(|pixels| pixels.peak_pa() > 0.0);
         match pixels {
             Some(pixels) => pixels.forces(&mut self.force_n),
             None => solver.forces(&mut self.force_n),
