@@ -4,7 +4,7 @@
 use crate::ExportError;
 use crate::contact::{Models, Placed, Rung, pixel_contact};
 use crate::dataset::Dataset;
-use crate::metrics::{SampleMetrics, quantile};
+use crate::metrics::{SampleMetrics, quantile, relative_l2};
 use crate::shear::traction;
 use papilla_contact::{
     Contact, InterfaceSkin, Object, PixelContact, Settings, ShearEnergy, Solver,
@@ -168,7 +168,7 @@ impl<'a> Rubbing<'a> {
             }
         }
         self.dataset.draw_pressure(indentation, shard, state, &mut truth)?;
-        self.pressure.push(miss(&pressure_pa, &truth));
+        self.pressure.extend(relative_l2(&pressure_pa, &truth));
         let due = [0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]]));
         let off = [0, 1, 2].map(|i| self.out.force_n[i] - due[i]);
         self.force.push(size(off) / size(due));
@@ -179,7 +179,8 @@ impl<'a> Rubbing<'a> {
                 let reason = "it holds no shear_pa: solve it with friction".to_owned();
                 ExportError::DatasetFile { path: path.clone(), reason }
             })?;
-        self.traction.push(miss(self.out.shear_pa.as_flattened(), due.as_flattened()));
+        let traction = self.out.shear_pa.as_flattened();
+        self.traction.extend(relative_l2(traction, due.as_flattened()));
         self.unsettled += usize::from(!self.out.quality.settled);
         let failed = |source| ExportError::Engine { path: path.clone(), source };
         network.infer(&pressure_pa, &mut sed).map_err(failed)?;
@@ -208,16 +209,6 @@ impl<'a> Rubbing<'a> {
             sed: self.sed.each_ref().map(|sed| both(sed)),
         }
     }
-}
-
-/// Relative L2.
-fn miss(found: &[f32], due: &[f32]) -> f64 {
-    let (mut miss, mut size) = (0.0, 0.0);
-    for (found, due) in found.iter().zip(due) {
-        miss += f64::from(found - due).powi(2);
-        size += f64::from(*due).powi(2);
-    }
-    (miss / size).sqrt()
 }
 
 fn size(v: [f64; 3]) -> f64 {

@@ -7,7 +7,7 @@ mod placed;
 pub use self::maps::ContactMaps;
 pub(crate) use self::placed::Placed;
 use crate::dataset::Dataset;
-use crate::metrics::{SampleMetrics, quantile};
+use crate::metrics::{SampleMetrics, quantile, relative_l2};
 use crate::processor::thread_s;
 use crate::{ExportError, read};
 use papilla_contact::{
@@ -311,14 +311,7 @@ impl Figures {
     /// Notes by how much the pressure is another than before.
     fn note_change(&mut self, out: &Contact) {
         let now_pa = self.pixels.as_ref().map_or(&out.pressure_pa[..], PixelContact::map_pa);
-        let (mut by, mut size) = (0.0, 0.0);
-        for (now, last) in now_pa.iter().zip(&self.last_pa) {
-            by += f64::from(now - last).powi(2);
-            size += f64::from(*last).powi(2);
-        }
-        if size > 0.0 {
-            self.side_step.push((by / size).sqrt());
-        }
+        self.side_step.extend(relative_l2(now_pa, &self.last_pa));
         self.last_pa.clear();
         self.last_pa.extend_from_slice(now_pa);
     }
@@ -342,13 +335,8 @@ impl Figures {
             None => skin.rasterise(&out.pressure_pa, &mut pressure_pa).map_err(refused)?,
         }
         dataset.draw_pressure(indentation, shard, state, &mut truth)?;
-        let (mut miss, mut size) = (0.0, 0.0);
-        for (found, due) in pressure_pa.iter().zip(&truth) {
-            miss += f64::from(found - due).powi(2);
-            size += f64::from(*due).powi(2);
-        }
         let norm = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
-        self.pressure.push((miss / size).sqrt());
+        self.pressure.extend(relative_l2(&pressure_pa, &truth));
         let due = norm([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
         self.force.push((norm(out.force_n) / due - 1.0).abs());
         self.told[0] += usize::from(!out.quality.settled);
