@@ -12,10 +12,14 @@
 mod poses;
 
 use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Settings, Solver};
+use papilla_progress::processor::thread_s;
 use poses::{DEPTH_MM, Pad, shapes};
-use rustix::time::{ClockId, clock_gettime};
 use std::error::Error;
+use std::path::Path;
 use std::sync::Arc;
+
+/// The shipped finger.
+const MODELS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models");
 
 /// How far a pose moves, to and fro, mm.
 const MOVE_MM: f64 = 0.01;
@@ -35,12 +39,6 @@ const METHODS: [(&str, Option<PixelSpacing>); 3] = [
     ("second_order", None),
 ];
 
-/// Processor time of this thread, us.
-fn processor_us() -> f64 {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    1e6 * time.tv_sec as f64 + 1e-3 * time.tv_nsec as f64
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let (mut poses, mut seed, mut moves) = (300, 20, 8);
     // `cargo test` starts benches too, with words of its own.
@@ -57,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => return Err(format!("{word}: use --poses N, --seed N, --moves N").into()),
         }
     }
-    let pad = Pad::shipped()?;
+    let pad = Pad::of(Path::new(MODELS))?;
     println!("{poses} poses of seed {seed}, us: median / 95th percentile\n");
     println!("| method | poses that touch | first frame | next frame | next frame, settled |");
     println!("|---|---|---|---|---|");
@@ -100,14 +98,14 @@ fn measure(
             pixels.reset();
         }
         let mut frame = |object: &Object| {
-            let began = processor_us();
+            let began = thread_s();
             match &mut pixels {
                 Some(pixels) => {
                     solver.solve_on_pixels(std::slice::from_ref(object), pixels, &mut out)
                 }
                 None => solver.solve(std::slice::from_ref(object), &mut out),
             }?;
-            let us = processor_us() - began;
+            let us = 1e6 * (thread_s() - began);
             let touches = out.force_n.iter().any(|force| *force != 0.0);
             Ok::<_, Box<dyn Error>>((us, touches, out.quality.settled))
         };

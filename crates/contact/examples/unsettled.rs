@@ -13,7 +13,11 @@ mod poses;
 use papilla_contact::{Contact, PixelContact, PixelSpacing, Settings, Solver};
 use poses::{DEPTH_MM, Pad, shapes};
 use std::error::Error;
+use std::path::Path;
 use std::sync::Arc;
+
+/// The shipped finger.
+const MODELS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models");
 
 /// What was asked on the command line.
 struct Asked {
@@ -60,7 +64,7 @@ impl Count {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let Asked { poses, seed, spacing } = Asked::read()?;
-    let (pad, shapes) = (Pad::shipped()?, shapes());
+    let (pad, shapes) = (Pad::of(Path::new(MODELS))?, shapes());
     let mut solver = Solver::new(Arc::clone(&pad.model), Settings::default())?;
     let mut pixels = PixelContact::new(Arc::clone(&pad.skin), &pad.model, spacing);
     let mut out = Contact::new(pad.model.vertices());

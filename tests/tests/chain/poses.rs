@@ -1,105 +1,29 @@
 //! Random objects in random places under the shipped finger, solved on pixels: what must hold for any
 //! frame.
 
+#[path = "../../../crates/contact/examples/poses/mod.rs"]
+mod thrown;
+
 use std::sync::Arc;
 
-use papilla_contact::{
-    Contact, ContactModel, Object, PixelContact, PixelSkin, PixelSpacing, Settings, Solver,
-};
+use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Settings, Solver};
 use papilla_proto::{
     atlas::{Atlas, MAP_SIDE_PX, Patch, Raster},
-    sdf::{
-        Cylinder, Dots, Grating, Placement, Plate, Punch, Ring, RoundedPlate, SignedDistance,
-        Sphere, Wedge,
-    },
+    sdf::Placement,
 };
 
 use crate::shipped::{folder, text};
+use thrown::{DEPTH_MM, Pad, shapes};
 
-/// Objects' tops are thrown so far round the pad's lowest point, mm.
-const AROUND_MM: f64 = 6.0;
-/// Deepest throw, mm; one in ten goes three times as deep.
-const DEPTH_MM: f64 = 2.0;
 /// Below this depth of a pixel, of places that are linear between vertices, contact is not missed, and
 /// above this distance there is none, mm.
 const CLEAR_MM: f64 = 0.05;
 /// Linearisations at vertices, 16 steps of 3 and 25, twice if a frame starts anew; rounds on pixels.
 const ITERATIONS_MAX: u32 = 2 * (16 * 3 + 25 + 12);
 
-/// A shape and how high its top is above its origin, mm.
-type Shape = (Arc<dyn SignedDistance>, f64);
-
-fn shapes() -> Vec<Shape> {
-    let plate = RoundedPlate::from(&Plate::default());
-    vec![
-        (Arc::new(plate), plate.half_mm[2]),
-        (Arc::new(Sphere { radius_mm: 4.0 }), 4.0),
-        (Arc::new(Sphere { radius_mm: 0.5 }), 0.5),
-        (Arc::new(Cylinder { radius_mm: 2.0, length_mm: 20.0, end_radius_mm: 0.5 }), 2.0),
-        (Arc::new(Wedge::default()), 0.0),
-        (Arc::new(Punch::default()), 0.0),
-        (Arc::new(Ring::default()), Ring::default().height_mm / 2.0),
-        (Arc::new(Grating::default()), 0.0),
-        (Arc::new(Dots::default()), 0.0),
-    ]
-}
-
-struct Pad {
-    model: Arc<ContactModel>,
-    skin: Arc<PixelSkin>,
-    raster: Arc<Raster>,
-    /// By entry of the raster.
-    places_mm: Vec<[f64; 3]>,
-}
-
-impl Pad {
-    fn shipped() -> Self {
-        let models = folder("models");
-        let atlas = Atlas::from_json(&text(&models.join("atlas.json"))).unwrap();
-        let file = std::fs::read(models.join("finger.contact")).unwrap();
-        let model = Arc::new(ContactModel::read(&file).unwrap());
-        let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
-        let places = raster.indices().iter().map(|index| {
-            let [row, column] = [*index as usize / MAP_SIDE_PX, *index as usize % MAP_SIDE_PX];
-            raster.position_mm(&atlas, row, column).unwrap().map(f64::from)
-        });
-        let places_mm = places.collect();
-        let skin = Arc::new(PixelSkin::new(&model, &atlas, Arc::clone(&raster)).unwrap());
-        Self { model, skin, raster, places_mm }
-    }
-
-    /// Its top as deep below a random place of the pad, tilted and spun.
-    fn throw(&self, random: &mut fastrand::Rng, (shape, top_mm): &Shape) -> Object {
-        let lowest = self.model.lowest_mm();
-        let at = loop {
-            let at = self.places_mm[random.usize(..self.places_mm.len())];
-            if (at[0] - lowest[0]).hypot(at[1] - lowest[1]) < AROUND_MM {
-                break at;
-            }
-        };
-        let most = if random.u8(..10) == 0 { 3.0 * DEPTH_MM } else { DEPTH_MM };
-        let depth_mm = -0.5 + (most + 0.5) * random.f64();
-        let [pitch, roll, spin] = [60.0, 60.0, 360.0].map(|range| range * (random.f64() - 0.5));
-        let Placement { rotation, .. } = Placement::turned(pitch, roll, spin, [0.0; 3]);
-        let tip_mm = [0, 1, 2].map(|i| rotation[i][2] * top_mm);
-        let up = [0.0, 0.0, depth_mm];
-        let origin_mm = [0, 1, 2].map(|i| at[i] + up[i] - tip_mm[i]);
-        Object::rigid(shape.clone(), Placement { rotation, origin_mm })
-    }
-
-    /// Least distance of the undeformed skin's pixels, mm.
-    fn clearance_mm(&self, objects: &[Object]) -> f64 {
-        let of = |o: &Object| {
-            let one = |p: &[f64; 3]| o.placement.clearance_mm(o.shape.as_ref(), *p);
-            self.places_mm.iter().map(one).fold(f64::INFINITY, f64::min)
-        };
-        objects.iter().map(of).fold(f64::INFINITY, f64::min)
-    }
-}
-
 /// No missed contact, no pressure in air, no tension, bounded work, whatever comes.
 fn throw_at(poses: usize, spacing: PixelSpacing) {
-    let (pad, shapes) = (Pad::shipped(), shapes());
+    let (pad, shapes) = (Pad::of(&folder("models")).unwrap(), shapes());
     let mut solver = Solver::new(Arc::clone(&pad.model), Settings::default()).unwrap();
     let mut pixels = PixelContact::new(Arc::clone(&pad.skin), &pad.model, spacing);
     let mut out = Contact::new(pad.model.vertices());
@@ -127,7 +51,8 @@ fn throw_at(poses: usize, spacing: PixelSpacing) {
         assert!(numbers.iter().all(|v| v.is_finite()), "{told}");
         assert!(out.effort.iterations <= ITERATIONS_MAX, "{told}");
         let pressed = pixels.peak_pa() > 0.0;
-        let nearest_mm = pad.clearance_mm(&objects);
+        let clearances = objects.iter().map(|object| pad.clearance_mm(object));
+        let nearest_mm = clearances.fold(f64::INFINITY, f64::min);
         assert!(pressed || nearest_mm > -CLEAR_MM, "missed by {nearest_mm} mm, {told}");
         // A held body presses from the side from which it came, wherever it is by now.
         let is_held = out.quality.is_held;
@@ -153,8 +78,10 @@ fn throw_at(poses: usize, spacing: PixelSpacing) {
 /// there a tilted plate and its image are a ridge, which vertices do not see and FE does.
 #[test]
 fn no_line_shows_where_the_map_ends() {
-    let pad = Pad::shipped();
-    let (plate, half_mm) = &shapes()[0];
+    let pad = Pad::of(&folder("models")).unwrap();
+    let atlas = Atlas::from_json(&text(&folder("models").join("atlas.json"))).unwrap();
+    let raster = Raster::new(&atlas, Patch::Skin);
+    let (_, plate, half_mm) = &shapes()[0];
     let mut solver = Solver::new(Arc::clone(&pad.model), Settings::default()).unwrap();
     let mut out = Contact::new(pad.model.vertices());
     // Pixels near the edge, how the skin there is tilted, and the rows that are looked at. The first
@@ -163,9 +90,7 @@ fn no_line_shows_where_the_map_ends() {
         [(150, 112, [-15.0, 0.0], 204), (112, 150, [0.0, -35.0], 165), (112, 62, [0.0, 45.0], 165)]
     {
         let depth_mm = 1.5;
-        let index = (row * MAP_SIDE_PX + column) as u32;
-        let entry = pad.raster.indices().iter().position(|i| *i == index).unwrap();
-        let at = pad.places_mm[entry];
+        let at = raster.position_mm(&atlas, row, column).unwrap().map(f64::from);
         let Placement { rotation, .. } = Placement::turned(tilt[0], tilt[1], 0.0, [0.0; 3]);
         let origin_mm = [0, 1, 2].map(|i| at[i] + rotation[i][2] * (depth_mm - half_mm));
         let object = Object::rigid(plate.clone(), Placement { rotation, origin_mm });

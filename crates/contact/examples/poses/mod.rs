@@ -1,4 +1,4 @@
-//! Random poses of things under the shipped finger.
+//! Random poses of things under a finger.
 
 use papilla_atlas::{Atlas, MAP_SIDE_PX, Patch, Raster};
 use papilla_contact::{ContactModel, Object, PixelSkin};
@@ -34,7 +34,7 @@ pub(crate) fn shapes() -> Vec<Shape> {
     ]
 }
 
-/// The shipped finger, and where its pixels are, mm.
+/// A finger, and where its pixels are, mm.
 pub(crate) struct Pad {
     pub(crate) model: Arc<ContactModel>,
     pub(crate) skin: Arc<PixelSkin>,
@@ -42,8 +42,8 @@ pub(crate) struct Pad {
 }
 
 impl Pad {
-    pub(crate) fn shipped() -> Result<Self, Box<dyn Error>> {
-        let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    /// From the folder of models.
+    pub(crate) fn of(models: &Path) -> Result<Self, Box<dyn Error>> {
         let atlas = Atlas::from_json(&std::fs::read_to_string(models.join("atlas.json"))?)?;
         let model = Arc::new(ContactModel::read(&std::fs::read(models.join("finger.contact"))?)?);
         let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
