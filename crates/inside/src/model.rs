@@ -63,7 +63,7 @@ impl Model {
         let hash = &network.info().atlas_hash;
         let bundle = Arc::new(Bundle::read(folder, contact, Some(hash))?);
         let interface = Raster::new(&bundle.atlas, Patch::Interface);
-        let error_laws = read_error_laws(folder.join("errors.json"))?;
+        let error_laws = read_error_laws(folder.join("errors.json"), hash)?;
         let shared = effects::Shared::default();
         Ok(Self { bundle, interface, shared, network, card, error_laws })
     }
@@ -77,11 +77,12 @@ impl Model {
     }
 }
 
-/// The laws of errors, if the folder has any.
-fn read_error_laws(file: PathBuf) -> Result<Option<ErrorLaws>, LoadError> {
+/// The laws of errors, if the folder has those of this atlas.
+fn read_error_laws(file: PathBuf, atlas_hash: &str) -> Result<Option<ErrorLaws>, LoadError> {
     if !file.exists() {
         return Ok(None);
     }
     let (file, json) = read_text(file)?;
-    ErrorLaws::from_json(&json).map(Some).map_err(|source| LoadError::Engine { file, source })
+    let laws = ErrorLaws::from_json(&json).map_err(|source| LoadError::Engine { file, source })?;
+    Ok(Some(laws).filter(|laws| laws.atlas_hash == atlas_hash))
 }
