@@ -4,6 +4,10 @@
 """
 
 import os
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -21,3 +25,17 @@ def pressure_pa():
     pressure_pa = np.zeros((224, 224), np.float32)
     pressure_pa[95:115, 105:130] = 8e3
     return pressure_pa
+
+
+@pytest.fixture
+def interrupted():
+    """Runs a program that prints "ready", and sends it Ctrl-C after some seconds; what it prints then."""
+
+    def run(program: str, after_s: float, within_s: float = 60.0) -> str:
+        running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+        assert running.stdout.readline() == "ready\n"
+        time.sleep(after_s)
+        running.send_signal(signal.SIGINT)
+        return running.communicate(timeout=within_s)[0]
+
+    return run

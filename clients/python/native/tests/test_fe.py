@@ -2,10 +2,7 @@
 
 import json
 import os
-import signal
 import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -213,9 +210,8 @@ def test_a_hard_case_is_an_error_with_fields():
     assert error.depth_mm > 2.0 and 0.0 < error.reached < 1.0
 
 
-def test_ctrl_c_and_close_end_a_solve():
+def test_ctrl_c_and_close_end_a_solve(interrupted):
     program = f"""
-import time
 from papilla import fe
 scene = fe.Scene({FINGER.replace('"linear"', '"quadratic"')!r})
 print("ready", flush=True)
@@ -224,11 +220,7 @@ try:
 except KeyboardInterrupt:
     print("interrupted")
 """
-    running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
-    assert running.stdout.readline() == "ready\n"
-    time.sleep(3.0)
-    running.send_signal(signal.SIGINT)
-    assert running.communicate(timeout=120)[0] == "interrupted\n"
+    assert interrupted(program, 3.0, within_s=120.0) == "interrupted\n"
     with fe.Scene(BLOCK).solve() as solve:
         first = next(solve)
     assert first.number == 0 and list(solve) == []

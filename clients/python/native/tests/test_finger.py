@@ -1,10 +1,5 @@
 """Contact in process: the bits of a session, warm starts, batches, hands, and errors."""
 
-import signal
-import subprocess
-import sys
-import time
-
 import numpy as np
 import pytest
 
@@ -156,7 +151,7 @@ def test_what_cannot_be_is_said(base, tmp_path):
     assert finger.touch(BALL, POSES[3]).force_n[2] > 0.05
 
 
-def test_ctrl_c_ends_a_batch():
+def test_ctrl_c_ends_a_batch(interrupted):
     program = """
 import numpy as np, papilla
 finger = papilla.Finger(pressure=None)
@@ -169,8 +164,4 @@ try:
 except KeyboardInterrupt:
     print("interrupted")
 """
-    running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
-    assert running.stdout.readline() == "ready\n"
-    time.sleep(1.0)
-    running.send_signal(signal.SIGINT)
-    assert running.communicate(timeout=60)[0] == "interrupted\n"
+    assert interrupted(program, 1.0) == "interrupted\n"

@@ -1,7 +1,6 @@
 """SED of maps and batches in process."""
 
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -77,7 +76,7 @@ def test_other_threads_of_python_go_on(model, pressure_pa):
     assert len(ticks) > 5
 
 
-def test_ctrl_c_ends_a_batch(pressure_pa):
+def test_ctrl_c_ends_a_batch(interrupted):
     program = """
 import numpy as np, papilla
 model = papilla.Model("small")
@@ -89,11 +88,7 @@ try:
 except KeyboardInterrupt:
     print("interrupted")
 """
-    running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
-    assert running.stdout.readline() == "ready\n"
-    time.sleep(1.0)
-    running.send_signal(signal.SIGINT)
-    assert running.communicate(timeout=60)[0] == "interrupted\n"
+    assert interrupted(program, 1.0) == "interrupted\n"
 
 
 def test_import_is_quick_and_the_client_works_without_the_native_module():
