@@ -361,6 +361,18 @@ def terminate_under(kind: str, certificate: str | None, service: subprocess.Pope
         return time.monotonic() - start
 
 
+# What the kinds of floods send, for the report.
+KINDS = """| four clients send | which is |
+|---|---|
+| windows | frames of 4 x 4 pixels |
+| whole maps | frames of 128 x 128 pixels, as the judged session sends them |
+| pings, pongs; the same before the hello | control messages of WebSocket, in an open session or before its first message |
+| hellos of 1 MB | first messages that are too long |
+| pieces of nothing | a message in endless empty parts |
+| `/v1/atlas.obj`, `/v1/presses/0/sed` | HTTP requests, one behind the other on one connection |
+""".split("\n")
+
+
 def markdown(found: dict) -> str:
     """The report of a run (docs/reports/neighbours.md)."""
     cpus = Path("/proc/cpuinfo").read_text()
@@ -381,6 +393,7 @@ def markdown(found: dict) -> str:
         "tests/soak/run --hostile --markdown docs/reports/neighbours.md",
         "```",
         "",
+        *KINDS,
         f"{time.strftime('%Y-%m-%d')}, {name}, {multiprocessing.cpu_count()} cores, which service, flooding clients and judge share. Times in ms.",
         f"**{sound} of {len(found['rows'])} are sound.**",
         "",

@@ -17,6 +17,7 @@ that of the greatest SED, NAME.ms the time of a map on one core, NAME.s that of 
 reference, reference-anew, broad, unseen, pressed, s1. reference.error and teacher.pressure are what
 the truths err themselves. Keys of contact: contact.METHOD.SET.QUANTITY
 and the same with .p95; quantities are pressure, force, sed, us (processor time of a warm frame).
+frame.NAME.METHOD.SET.ms is a warm frame from poses: the network and the contact before it.
 sessions.NAME.maps and sessions.NAME.poses are the sessions of 90 Hz that one core holds at half
 load, from the two times above (docs/guides/operating.md).
 
@@ -134,11 +135,25 @@ def of_sizing(text: str, contact_us: float) -> dict[str, str]:
     return found
 
 
+def of_frames(text: str, contact: dict[str, str]) -> dict[str, str]:
+    """Times of frames from poses: contact, then a network."""
+    found = {}
+    for rung in json.loads(text)["rungs"]:
+        if latency := (rung["latency_ms"] or {}).get("tract"):
+            for key, us in contact.items():
+                parts = key.split(".")
+                if parts[-1] == "us":
+                    time_ms = latency["p50"] + float(us) / 1000
+                    found[f"frame.{rung['name']}.{parts[1]}.{parts[2]}.ms"] = milliseconds(time_ms)
+    return found
+
+
 def figures() -> dict[str, str]:
     """All figures, by key."""
     ladder = (ROOT / "models/ladder.json").read_text()
     contact = of_contact((ROOT / "docs/reports/contact.md").read_text())
-    return of_ladder(ladder) | contact | of_sizing(ladder, float(contact["contact.pixels.broad.us"]))
+    sizing = of_sizing(ladder, float(contact["contact.pixels.broad.us"]))
+    return of_ladder(ladder) | contact | sizing | of_frames(ladder, contact)
 
 
 def filled(text: str, known: dict[str, str]) -> tuple[str, list[str]]:
