@@ -323,7 +323,7 @@ itself, so they include the network's own: the row *true pressure* has that alon
 | smoothest field | the way of `papilla.sensors`: a smooth field that is nowhere negative and has the readings as its means |
 
 The first two drop readings below two standard deviations of the noise. The constants of the third were chosen on
-training states (`study.py choose`). *SED* is the relative L2 norm of the error over the map, where 100 % is as
+training states (`sensors.py choose`). *SED* is the relative L2 norm of the error over the map, where 100 % is as
 wrong as a map of zeros. *Force* is the integral of pressure over the undeformed skin. *SA1* is the sum of the
 static rates of all SA1 afferents, by the formula of the effect
 [`afferents`](../../docs/reference/protocol-effects.md#afferents).
