@@ -173,7 +173,14 @@ def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
 def _train_arguments(parser: argparse.ArgumentParser) -> None:
     _dataset_argument(parser)
     add = parser.add_argument
-    add("--network", default="s1-base8", help="s1-baseN or map-... (s1-base8)")
+    add("--network", help="s1-baseN or map-... (that of --start, else s1-base8)")
+    add(
+        "--start",
+        type=Path,
+        metavar="FILE.onnx",
+        help="begin with the weights of this exported model, a network on maps, in place of random "
+        "ones; it may be of another atlas",
+    )
     add("--out", type=Path, required=True, metavar="RUN_DIR", help="directory of the run")
     add("--resume", action="store_true", help="go on with the run in RUN_DIR if there is one")
     add("--epochs", type=int, default=40, help="passes over the training indentations (40)")

@@ -14,7 +14,9 @@ from papilla_trainer.errors import CheckError, TrainerError, UsageError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from papilla_trainer.config import TrainConfig
     from papilla_trainer.dataset import Dataset
+    from papilla_trainer.start import Start
     from papilla_trainer.training import Progress
 
 INTERRUPTED = 130
@@ -36,15 +38,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.config import TrainConfig
     from papilla_trainer.report import plot_history
     from papilla_trainer.training import Trainer
 
-    config = TrainConfig(
-        **{name: getattr(options, name) for name in TrainConfig.__dataclass_fields__}
-    )
+    config, start = _config(options)
     dataset = _datasets(options, options.dataset)
-    trainer = Trainer(dataset, config, options.out, resume=options.resume)
+    trainer = Trainer(dataset, config, options.out, resume=options.resume, start=start)
     with _Bar(trainer.state.epoch, config.epochs, trainer.epoch_samples) as bar:
         try:
             state = trainer.fit(bar.listen)
@@ -74,14 +73,11 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 
 def _curve(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.config import TrainConfig
     from papilla_trainer.curve import learning_curve, table
     from papilla_trainer.dataset import Dataset
     from papilla_trainer.maps import Store
 
-    config = TrainConfig(
-        **{name: getattr(options, name) for name in TrainConfig.__dataclass_fields__}
-    )
+    config, start = _config(options)
     store = Store(options.maps, options.fe_datagen)
     rows = learning_curve(
         [Dataset(directory, store) for directory in options.dataset],
@@ -91,6 +87,7 @@ def _curve(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         options.out,
         _Bar,
         options.model_export,
+        start,
     )
     return {"network": config.network, "rows": rows}, table(rows)
 
@@ -192,6 +189,17 @@ def _require_rank(options: argparse.Namespace) -> None:
 
 def _written_text(result: dict[str, Any]) -> str:
     return f"{result['model']}: {result['bytes']} bytes"
+
+
+def _config(options: argparse.Namespace) -> tuple[TrainConfig, Start | None]:
+    from papilla_trainer.config import TrainConfig
+    from papilla_trainer.start import Start
+
+    start = options.start and Start.read(options.start)
+    own = {name: getattr(options, name) for name in TrainConfig.__dataclass_fields__}
+    own["start"] = start and start.record()
+    own["network"] = options.network or (start.spec.name if start else TrainConfig.network)
+    return TrainConfig(**own), start
 
 
 def _datasets(options: argparse.Namespace, folders: list[Path]) -> Dataset:

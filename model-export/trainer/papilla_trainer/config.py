@@ -42,6 +42,8 @@ class TrainConfig:
     dataset_samples: int | None = None
     shift_px: int = 0
     contact: list[str] = field(default_factory=list)
+    # Name and hash of the model whose weights are the first; none: random ones.
+    start: dict[str, str] | None = None
 
     def __post_init__(self) -> None:
         if self.shift_px and not isinstance(self.spec, MapSpec):

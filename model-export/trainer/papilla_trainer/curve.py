@@ -20,6 +20,7 @@ from papilla_trainer.export import export_run
 from papilla_trainer.files import write_atomic, write_json
 from papilla_trainer.joined import JoinedDataset
 from papilla_trainer.report import write_csv
+from papilla_trainer.start import Start
 from papilla_trainer.training import Trainer
 
 FIGURES = ("relative_l2", "far_field_relative_l2")
@@ -72,11 +73,12 @@ def learning_curve(
     out: Path,
     bar: Callable[[int, int, int], Any],
     program: str | None = None,
+    start: Start | None = None,
 ) -> list[dict[str, Any]]:
     """A row for each number of indentations and each jury; ``bar`` shows a run.
 
     ``program``: model-export; without it ``MODEL_EXPORT`` names it, else it is looked for in
-    ``PATH``.
+    ``PATH``. ``start``: every run begins with its weights.
     """
     dataset = parts[0] if len(parts) == 1 else JoinedDataset(parts)
     aside = config.validation_count(len(dataset.train_ids))
@@ -92,7 +94,7 @@ def learning_curve(
         epochs = math.ceil(config.epochs * every / samples)
         settings = replace(config, train_presses=count, epochs=epochs)
         run = out / f"presses-{count}"
-        trainer = Trainer(dataset, settings, run, resume=True)
+        trainer = Trainer(dataset, settings, run, resume=True, start=start)
         with bar(trainer.state.epoch, epochs, samples) as progress:
             state = trainer.fit(progress.listen)
         model = export_run(run, run / f"{config.network}.onnx")

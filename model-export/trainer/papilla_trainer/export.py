@@ -133,6 +133,8 @@ def training_record(checkpoint: Checkpoint, weights: str) -> dict[str, Any]:
     }
     if config.loss_name == "relative":
         training["loss"] = f"relative L2 squared + {config.far_weight} x that of the far field"
+    if config.start:
+        training["start"] = config.start
     if config.shift_px:
         training["shift_px"] = config.shift_px
     if config.contact:

@@ -150,6 +150,22 @@ class BlockWeights(NamedTuple):
     over_finger: Tensor
 
 
+def level_of_blocks(
+    spec: MapSpec, near: Tensor, above: Tensor, over_finger: Tensor
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Kernel, mix and over_finger of the level that :meth:`Level.on_blocks` made these of."""
+    width, components = 2 * spec.kernel - 1, spec.components
+    tap = _taps(spec.kernel)
+    # A weight stands wherever a pixel of a block is at its place; all of these are equal.
+    kernel = near.new_zeros(components, width**2 + 1)
+    kernel[:, tap.flatten()] = near.reshape(components, -1)
+    between = _between()
+    row, column = 1, 1  # the middle: nowhere 0
+    mixed = above.reshape(components, _BLOCK, components, *between.shape[2:])
+    mix = mixed[:, 0, :, row, column] / between[0, 0, row, column]
+    return kernel[:, :-1].contiguous(), mix.contiguous(), over_finger[::_BLOCK].contiguous()
+
+
 class ServedLevel(nn.Module):
     """A level whose weights are constants, as they are exported."""
 

@@ -21,6 +21,7 @@ from papilla_trainer.draw import draw, drawn
 from papilla_trainer.errors import RunError, TrainerError
 from papilla_trainer.map_network import MapNet
 from papilla_trainer.report import write_history
+from papilla_trainer.start import Start
 from papilla_trainer.tasks import make_task
 
 BEST_LOSS_AT_START = math.inf
@@ -43,7 +44,13 @@ class Trainer:
     """One run: build or resume, then ``fit``."""
 
     def __init__(
-        self, dataset: Dataset, config: TrainConfig, run_dir: Path, *, resume: bool = False
+        self,
+        dataset: Dataset,
+        config: TrainConfig,
+        run_dir: Path,
+        *,
+        resume: bool = False,
+        start: Start | None = None,
     ) -> None:
         exists = (run_dir / FILE_NAME).is_file()
         if exists and not resume:
@@ -60,6 +67,8 @@ class Trainer:
         fit_ids = fewer(fit_ids, config.train_presses, config.seed)
         task = make_task(dataset, config, fit_ids, validation_ids, self.device)
         self.network, self.loss = task.network, task.loss
+        if start is not None:
+            start.give(self.network, config.network)
         self.fit_samples, self.validation = task.fit, task.validation
         self.epoch_samples = drawn(task.fit.source, config.dataset_samples)
         self.on_pixels = isinstance(self.network, MapNet)
