@@ -2,6 +2,7 @@
 
 use super::{Fitted, GROUPS};
 use crate::metrics::quantile;
+use papilla_output::plot::palette::{self, GREY};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
@@ -10,15 +11,9 @@ type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 const PANEL_PX: (u32, u32) = (560, 500);
 const LEGEND_PX: u32 = 40;
-const GREY: RGBColor = RGBColor(120, 120, 120);
-/// Colours that stay apart for colour-blind eyes (Okabe & Ito 2008), by group.
-const COLOURS: [RGBColor; 5] = [
-    RGBColor(0, 114, 178),
-    RGBColor(230, 159, 0),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(60, 60, 60),
-];
+/// Colours of the groups, in their order.
+const COLOURS: [RGBColor; 5] =
+    [palette::BLUE, palette::ORANGE, palette::VERMILION, palette::GREEN, palette::DARK];
 /// Least and greatest of both axes, %.
 const AXIS: std::ops::Range<f64> = 2.0..200.0;
 /// Answers are put into so many bins of equal count.

@@ -1,5 +1,6 @@
 //! `model-export calibrate`.
 
+use super::options::Folders;
 use super::{load_card, load_model, print_json};
 use anyhow::bail;
 use papilla_engine::Backend;
@@ -14,12 +15,8 @@ const STEM: &str = "expected-error";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Folder of the datasets; those that are not there are passed over.
-    #[arg(long, default_value = "data", value_name = "FOLDER")]
-    data: PathBuf,
-    /// Folder of the models, with index.json and finger.contact; errors.json is written there.
-    #[arg(long, default_value = "models", value_name = "FOLDER")]
-    models: PathBuf,
+    #[command(flatten)]
+    folders: Folders,
     /// Networks to calibrate; all others state no error [default: those of the index that are not
     /// loaded on demand].
     #[arg(long, num_args = 1.., value_name = "NAME")]
@@ -36,7 +33,8 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let index = Index::from_json(&read_text(&options.models.join("index.json"))?)?;
+    let Folders { data, shipped } = &options.folders;
+    let index = Index::from_json(&read_text(&shipped.models.join("index.json"))?)?;
     let states = match &options.from {
         Some(path) => serde_json::from_slice(&read(path)?)?,
         None => {
@@ -46,7 +44,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
                 named => named.to_vec(),
             };
             let progress = Progress::new("states", 0, 0, json);
-            States::of(&options.data, &options.models, &names, || progress.inc())?
+            States::of(data, &shipped.models, &names, || progress.inc())?
         }
     };
     if let Some(path) = &options.states {
@@ -54,7 +52,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     }
     if states.is_empty() {
         let names: Vec<&str> = SETS.iter().map(|set| set.folder).collect();
-        bail!("{} holds none of {}", options.data.display(), names.join(", "));
+        bail!("{} holds none of {}", data.display(), names.join(", "));
     }
     let progress = Progress::new("errors", 0, 0, json);
     let mut outcome = Outcome::of(&states, || progress.inc());
@@ -62,7 +60,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     outcome.cost = cost(options, &outcome)?;
     let mut laws = serde_json::to_vec_pretty(&outcome.laws)?;
     laws.push(b'\n');
-    write(&options.models.join("errors.json"), &laws)?;
+    write(&shipped.models.join("errors.json"), &laws)?;
     let mut figures = serde_json::to_vec_pretty(&outcome)?;
     figures.push(b'\n');
     write(&options.out.join(format!("{STEM}.json")), &figures)?;
@@ -85,7 +83,7 @@ fn cost(options: &Options, outcome: &Outcome) -> anyhow::Result<Option<Cost>> {
     let wanted = ["nano", "small"];
     let of = |name: &&str| outcome.laws.networks.iter().find(|laws| laws.name == **name);
     let Some(laws) = wanted.iter().find_map(of) else { return Ok(None) };
-    let path = options.models.join(format!("{}.onnx", laws.name));
+    let path = options.folders.shipped.models.join(format!("{}.onnx", laws.name));
     let card = load_card(&path.with_extension("json"))?;
     let model = load_model(&path, Backend::default(), Some(&card))?;
     let trained = card.input_statistics_max.map(|of| of.cells).unwrap_or_default();

@@ -1,7 +1,8 @@
 //! `model-export check`.
 
+use super::options::RunModel;
 use super::{load_card, load_model, print_json};
-use papilla_engine::{Backend, ModelInfo};
+use papilla_engine::ModelInfo;
 use papilla_model_export::evaluate::require_atlas;
 use papilla_model_export::{ExportError, read_text};
 use papilla_proto::atlas::Atlas;
@@ -9,22 +10,19 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// The model, an `.onnx` file.
-    model: PathBuf,
+    #[command(flatten)]
+    run: RunModel,
     /// The atlas that the model must belong to.
     #[arg(long, value_name = "FILE")]
     atlas: Option<PathBuf>,
     /// The card that must belong to the model.
     #[arg(long, value_name = "FILE")]
     card: Option<PathBuf>,
-    /// What runs it: `tract`, or `ort` in programs built with `--features ort`.
-    #[arg(long, default_value_t, value_name = "ENGINE")]
-    backend: Backend,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let card = options.card.as_deref().map(load_card).transpose()?;
-    let model = load_model(&options.model, options.backend, card.as_ref())?;
+    let model = load_model(&options.run.model, options.run.backend, card.as_ref())?;
     let info = model.info();
     if let Some(path) = &options.atlas {
         require_atlas(&path.display().to_string(), load_atlas(path)?.hash(), info)?;

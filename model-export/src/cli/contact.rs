@@ -1,5 +1,6 @@
 //! `model-export contact`.
 
+use super::options::ContactOf;
 use super::{load_model, print_json};
 use papilla_engine::Backend;
 use papilla_model_export::contact::{Models, Row, Rung, errors_of, measure};
@@ -10,11 +11,8 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// The contact model, a file of `fe-datagen contact`.
-    model: PathBuf,
-    /// Datasets of the same finger; their held-out indentations are taken.
-    #[arg(required = true)]
-    datasets: Vec<PathBuf>,
+    #[command(flatten)]
+    of: ContactOf,
     /// A network, `.onnx`, that makes SED of the pressure.
     #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,
@@ -28,7 +26,7 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let models = Models::read(&options.model)?;
+    let models = Models::read(&options.of.model)?;
     let network = options.network.as_deref();
     let network = network.map(|path| load_model(path, Backend::default(), None)).transpose()?;
     let mut session = None;
@@ -37,8 +35,8 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         session = Some(network.session().map_err(failed)?);
     }
     let mut rows = Vec::new();
-    let progress = Progress::new("rungs", options.datasets.len() * Rung::ALL.len(), 0, json);
-    for folder in &options.datasets {
+    let progress = Progress::new("rungs", options.of.datasets.len() * Rung::ALL.len(), 0, json);
+    for folder in &options.of.datasets {
         let dataset = Dataset::open(folder)?;
         models.require_atlas(&dataset, folder)?;
         if let Some(network) = &network {
@@ -54,7 +52,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     drop(progress);
     if let Some(path) = &options.write {
         let network = network.as_ref().map(|network| network.info().name.clone());
-        let errors = errors_of(&papilla_model_export::read(&options.model)?, network, &rows);
+        let errors = errors_of(&papilla_model_export::read(&options.of.model)?, network, &rows);
         let mut text = serde_json::to_vec_pretty(&errors)?;
         text.push(b'\n');
         papilla_model_export::write(path, &text)?;

@@ -1,5 +1,6 @@
 //! `model-export contact-maps`.
 
+use super::options::ContactOf;
 use super::print_json;
 use papilla_model_export::contact::{ContactMaps, Models};
 use papilla_model_export::dataset::Dataset;
@@ -10,21 +11,18 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// The contact model, a file of `fe-datagen contact`.
-    model: PathBuf,
-    /// Datasets of the same finger.
-    #[arg(required = true)]
-    datasets: Vec<PathBuf>,
+    #[command(flatten)]
+    of: ContactOf,
     /// Folder to write a file to for each dataset, NAME.npz; the trainer reads them (`--contact`).
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let models = Models::read(&options.model)?;
-    let progress = Progress::new("datasets", options.datasets.len(), 0, json);
+    let models = Models::read(&options.of.model)?;
+    let progress = Progress::new("datasets", options.of.datasets.len(), 0, json);
     let mut written = Vec::new();
-    for folder in &options.datasets {
+    for folder in &options.of.datasets {
         let dataset = Dataset::open(folder)?;
         models.require_atlas(&dataset, folder)?;
         let maps = ContactMaps::of(&models, &dataset)?;

@@ -1,5 +1,6 @@
 //! `model-export evaluate`.
 
+use super::options::RunModel;
 use super::{load_card, load_model, print_json};
 use papilla_dataset::Split;
 use papilla_engine::card::{Card, Latency, Spread};
@@ -17,8 +18,8 @@ use std::sync::Arc;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// The model, an `.onnx` file.
-    model: PathBuf,
+    #[command(flatten)]
+    run: RunModel,
     /// Folder of the dataset, as `fe-datagen generate` writes it.
     dataset: PathBuf,
     /// Which indentations: `test` (held out), `train` or `all`.
@@ -40,19 +41,16 @@ pub(crate) struct Options {
     /// Difference from the reference, relative to the maximum, beyond which it fails.
     #[arg(long, default_value_t = TOLERANCE, value_name = "PART")]
     tolerance: f64,
-    /// What runs the model: `tract`, or `ort` in programs built with `--features ort`.
-    #[arg(long, default_value_t, value_name = "ENGINE")]
-    backend: Backend,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let model = load_model(&options.model, options.backend, None)?;
+    let model = load_model(&options.run.model, options.run.backend, None)?;
     let info = model.info();
     let dataset = Dataset::open(&options.dataset)?;
     if options.card.is_some() {
         require_held_out(options, info, &dataset)?;
     }
-    let subject = Subject { path: &options.model, model: model.as_ref() };
+    let subject = Subject { path: &options.run.model, model: model.as_ref() };
     let other = second_engine(options)?;
     let mut difference = recorded_difference(options, model.as_ref())?;
     let evaluation = measure(options, &subject, other.as_deref(), &dataset, json)?;
@@ -103,7 +101,7 @@ fn require_held_out(options: &Options, info: &ModelInfo, dataset: &Dataset) -> a
 /// ONNX Runtime on the same model, if `--reference ort` asks for it.
 fn second_engine(options: &Options) -> Result<Option<Arc<dyn Model>>, ExportError> {
     if options.reference.as_deref().is_some_and(|reference| reference.as_os_str() == "ort") {
-        return load_model(&options.model, Backend::Ort, None).map(Some);
+        return load_model(&options.run.model, Backend::Ort, None).map(Some);
     }
     Ok(None)
 }
@@ -112,9 +110,9 @@ fn second_engine(options: &Options) -> Result<Option<Arc<dyn Model>>, ExportErro
 fn recorded_difference(options: &Options, model: &dyn Model) -> Result<Option<f64>, ExportError> {
     let recorded = options.reference.as_deref().filter(|path| path.as_os_str() != "ort");
     let Some(path) = recorded else { return Ok(None) };
-    let failed = |source| ExportError::Engine { path: options.model.clone(), source };
+    let failed = |source| ExportError::Engine { path: options.run.model.clone(), source };
     let mut session = model.session().map_err(failed)?;
-    let difference = Recorded::read(path)?.difference(session.as_mut(), &options.model)?;
+    let difference = Recorded::read(path)?.difference(session.as_mut(), &options.run.model)?;
     let other = path.display().to_string();
     agree(Some(difference), model.info(), &other, options.tolerance)?;
     Ok(Some(difference))

@@ -1,5 +1,6 @@
 //! `model-export friction`.
 
+use super::options::ContactOf;
 use super::{load_model, print_json};
 use papilla_engine::Backend;
 use papilla_model_export::ExportError;
@@ -11,24 +12,21 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// The contact model, a file of `fe-datagen contact`.
-    model: PathBuf,
-    /// Datasets of the same finger, solved with friction; all their states are taken.
-    #[arg(required = true)]
-    datasets: Vec<PathBuf>,
+    #[command(flatten)]
+    of: ContactOf,
     /// A network, `.onnx`, that makes SED of the pressure.
     #[arg(long, value_name = "FILE")]
     network: PathBuf,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let models = Models::read(&options.model)?;
+    let models = Models::read(&options.of.model)?;
     let network = load_model(&options.network, Backend::default(), None)?;
     let failed = |source| ExportError::Engine { path: options.network.clone(), source };
     let mut session = network.session().map_err(failed)?;
     let mut rows = Vec::new();
-    let progress = Progress::new("rungs", options.datasets.len() * RUBBING.len(), 0, json);
-    for folder in &options.datasets {
+    let progress = Progress::new("rungs", options.of.datasets.len() * RUBBING.len(), 0, json);
+    for folder in &options.of.datasets {
         let dataset = Dataset::open(folder)?;
         models.require_atlas(&dataset, folder)?;
         for rung in RUBBING {

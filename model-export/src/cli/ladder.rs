@@ -1,5 +1,6 @@
 //! `model-export ladder`, and the hidden command that weighs one model in a fresh process.
 
+use super::options::Folders;
 use super::print_json;
 use papilla_engine::{Ladder, MAP_LEN};
 use papilla_model_export::ladder::{self, Canvas, Footprint, Progress, Task, plot, report};
@@ -13,15 +14,8 @@ const STEM: &str = "accuracy-vs-time";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Folder of the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final`, `final-anew`
-    /// and `s1-graded`;
-    /// those that are not there are reported as not measured. `friction-graded` and
-    /// `sliding-graded` say what traction is worth.
-    #[arg(long, default_value = "data", value_name = "FOLDER")]
-    data: PathBuf,
-    /// Folder of the models, with index.json, atlas.json and finger.contact.
-    #[arg(long, default_value = "models", value_name = "FOLDER")]
-    models: PathBuf,
+    #[command(flatten)]
+    folders: Folders,
     /// Datasets of the campaign `final` on other meshes, the solver's own rungs
     /// [default: DATA/final and the folders in DATA/rungs].
     #[arg(long, num_args = 1.., value_name = "FOLDER")]
@@ -39,10 +33,11 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
+    let Folders { data, shipped } = &options.folders;
     let task = Task {
-        data: options.data.clone(),
-        models: options.models.clone(),
-        fe: if options.fe.is_empty() { fe_folders(&options.data) } else { options.fe.clone() },
+        data: data.clone(),
+        models: shipped.models.clone(),
+        fe: if options.fe.is_empty() { fe_folders(data) } else { options.fe.clone() },
         quick: options.quick,
     };
     let ladder = match &options.from {
@@ -80,7 +75,8 @@ fn fe_folders(data: &Path) -> Vec<PathBuf> {
 fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>> {
     let named = |ending: &str| options.out.join(format!("{STEM}{ending}"));
     let chart = |what| move |reason| ExportError::Chart { what, reason };
-    let canvas = Canvas::read(&options.models)?;
+    let models = &options.folders.shipped.models;
+    let canvas = Canvas::read(models)?;
     let json = ladder.to_json()?;
     let mut files = vec![
         (named(".md"), report::markdown(ladder, STEM)),
@@ -89,7 +85,7 @@ fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>>
         (named(".json"), json.clone()),
     ];
     if !ladder.quick {
-        files.push((options.models.join("ladder.json"), json));
+        files.push((models.join("ladder.json"), json));
     }
     for (path, text) in &files {
         write(path, text.as_bytes())?;

@@ -9,6 +9,7 @@ mod friction;
 mod here;
 mod index;
 mod ladder;
+mod options;
 mod patterns;
 
 use clap::{Parser, Subcommand};
@@ -106,7 +107,9 @@ enum Command {
     ///
     /// Every model of the index is run on all held-out sets (held-out indentations, held-out shapes,
     /// pressed hard, the published campaign, the states of the FE reference); FE rungs
-    /// are held against the reference. Written: a page with tables and pictures, the figures as
+    /// are held against the reference. The sets are the datasets `broad-graded`, `heldout-graded`,
+    /// `pressed-graded`, `final`, `final-anew` and `s1-graded` in DATA; `friction-graded` and
+    /// `sliding-graded` there say what traction is worth. Written: a page with tables and pictures, the figures as
     /// JSON, and the same as MODELS/ladder.json, by which the server chooses.
     #[command(after_long_help = EXIT_CODES)]
     Ladder(ladder::Options),
@@ -118,14 +121,15 @@ enum Command {
     Here(here::Options),
     /// Measure the contact ladder: from where an indenter is to pressure, force and SED.
     ///
-    /// Springs, a half-space, the finger's compliance, and its second order told gaps or the object,
-    /// each against the FE states of the datasets, with the processor time of a frame.
+    /// Springs, a half-space, the finger's compliance, and its second order, from gaps or from the
+    /// object, each against the held-out FE states of the datasets, with the processor time of a frame.
     #[command(after_long_help = EXIT_CODES)]
     Contact(contact::Options),
     /// Measure friction: from an indenter's way to force, traction along the skin and SED.
     ///
     /// Contact at vertices, on coarse pixels and on pixels, each along the ways of simulations with friction,
-    /// in steps of .05 mm at most, against their FE states.
+    /// in steps of .05 mm at most, against all FE states of the datasets, which have to be solved with
+    /// friction.
     #[command(after_long_help = EXIT_CODES)]
     Friction(friction::Options),
     /// Write the pressure that contact on pixels makes of a dataset's indentations.

@@ -23,6 +23,7 @@ use papilla_fem::solve::{
     SurfacePressure, SurfacePressureError,
 };
 use papilla_sdf::Placement;
+use papilla_sdf::vector::minus;
 use papilla_solid::tensor::{norm, product};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -218,6 +219,19 @@ pub struct RecordedPatch {
     epidermis: SedRecovery,
 }
 
+/// What the checks of an equilibrium compare, under an indenter or under a given pressure.
+pub(super) struct Sides {
+    /// Force of the pressure that is recorded, N.
+    pub recorded_n: [f64; 3],
+    /// Force that the solver says presses into the body, N.
+    pub normal_n: [f64; 3],
+    /// Work done on the body, and the greatest so far, mJ.
+    pub work_mj: f64,
+    pub work_mj_max: f64,
+    /// Largest gap or overlap where there is contact, mm.
+    pub gap_mm: f64,
+}
+
 impl Body {
     /// A body with layers, of which pressure and SED are read at vertices.
     pub(super) fn with_patch(
@@ -364,15 +378,7 @@ impl Body {
         self.follows(solver, depth_mm)?;
         let skin = &self.problem.mesh.surfaces[&self.contact];
         let pressure = solver.pressure_mpa(skin);
-        let integral = self.force_of_pressure_n(solver, &pressure);
-        let balance = solver.balance();
-        let force = balance.contact_force_n;
-        let size = norm(force).max(solver.least_force_n());
-        let difference =
-            |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
-        let work = solver.indenter_work_mj();
-        let [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] =
-            self.at_vertices(solver, &pressure)?;
+        let values = self.at_vertices(solver, &pressure)?;
         let mut shear_mpa = Vec::new();
         if let Some(p) = &self.patch {
             shear_mpa = self.shear_mpa(solver, &p.patch.skin);
@@ -380,32 +386,60 @@ impl Body {
                 shear_mpa = vertices.vector(&shear_mpa);
             }
         }
-        Ok(IncrementRecord {
+        let sides = Sides {
+            recorded_n: self.force_of_pressure_n(solver, &pressure),
+            normal_n: solver.balance().normal_force_n,
+            work_mj: solver.indenter_work_mj(),
+            work_mj_max: solver.indenter_work_mj_max(),
+            gap_mm: report.gap_error_mm,
+        };
+        Ok(self.recorded(solver, report, depth_mm, values, shear_mpa, &sides))
+    }
+
+    /// The record of the solver's equilibrium with `values`, which are pressure and SED on both sides
+    /// of the interface at vertices, MPa.
+    pub(super) fn recorded(
+        &self,
+        solver: &Solver<'_>,
+        report: &StepReport,
+        depth_mm: f64,
+        values: [Vec<f64>; 3],
+        shear_mpa: Vec<[f64; 3]>,
+        sides: &Sides,
+    ) -> IncrementRecord {
+        let [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] = values;
+        let balance = solver.balance();
+        let force_n = balance.contact_force_n;
+        let size_n = norm(force_n).max(solver.least_force_n());
+        let difference = |a: [f64; 3], b: [f64; 3]| norm(minus(a, b)) / size_n;
+        let energy_mj = report.stored_mj + report.dissipated_mj;
+        let checks = Checks {
+            residual_relative: report.residual_relative,
+            contact_force_vs_pressure_integral: difference(sides.recorded_n, sides.normal_n),
+            plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force_n),
+            energy_vs_work: (energy_mj - sides.work_mj).abs()
+                / sides.work_mj_max.max(f64::MIN_POSITIVE),
+            j_min: report.j_min,
+            penetration_mm_max: sides.gap_mm,
+            newton_iterations: report.effort.newton_iterations,
+            step_cuts: report.effort.cuts,
+            augmentations: report.effort.augmentations,
+            factorizations: report.effort.factorizations,
+            cg_iterations: report.effort.cg_iterations,
+        };
+        IncrementRecord {
             depth_mm,
             time_s: 0.0,
-            force_n: force,
+            force_n,
             pressure_mpa,
             sed_dermis_mpa,
             sed_epidermis_mpa,
             shear_mpa,
             outside_calibration: self.outside_calibration(solver),
             contact: solver.contact_rule(),
-            checks: Checks {
-                residual_relative: report.residual_relative,
-                contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),
-                plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force),
-                energy_vs_work: (report.stored_mj + report.dissipated_mj - work).abs()
-                    / solver.indenter_work_mj_max().max(f64::MIN_POSITIVE),
-                j_min: report.j_min,
-                penetration_mm_max: report.gap_error_mm,
-                newton_iterations: report.effort.newton_iterations,
-                step_cuts: report.effort.cuts,
-                augmentations: report.effort.augmentations,
-                factorizations: report.effort.factorizations,
-                cg_iterations: report.effort.cg_iterations,
-            },
+            checks,
             seconds: 0.0,
-        })
+        }
     }
 
     /// Pressure and SED on both sides of the interface at the vertices of the patch, of pressure at

@@ -1,6 +1,6 @@
 //! A finger under a given pressure, in place of an indenter.
 
-use super::body::{Body, SimulationError, Under};
+use super::body::{Body, Sides, SimulationError, Under};
 use super::drive::Watch;
 use super::fields::PA_PER_MPA;
 use super::record::IncrementRecord;
@@ -8,10 +8,10 @@ use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build, build_pressed};
 use papilla_atlas::flatten::build_atlas;
 use papilla_atlas::{Atlas, MAP_SIDE_PX, Patch};
-use papilla_dataset::Checks;
 use papilla_fem::solve::{
     Effort, Loading, Materials, SolveError, Solver, StepReport, SurfacePressure,
 };
+use papilla_sdf::vector::{dot, minus};
 use papilla_solid::tensor::norm;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -34,14 +34,6 @@ struct MapOnSkin<'a> {
     /// Corners of each triangle: place, mm, and pixels.
     triangles: Vec<[([f64; 3], [f64; 2]); 3]>,
     boxes: HashMap<[i32; 3], Vec<usize>>,
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|i| a[i] * b[i]).sum()
 }
 
 fn box_of(x: [f64; 3]) -> [i32; 3] {
@@ -249,46 +241,23 @@ impl Body {
         report: &StepReport,
     ) -> Result<IncrementRecord, SimulationError> {
         let nodal = self.pressure_mpa(solver);
-        let balance = solver.balance();
-        let force = balance.contact_force_n;
+        let values = self.at_vertices(solver, &nodal)?;
+        let force = solver.balance().contact_force_n;
         let size = norm(force).max(solver.least_force_n());
-        let difference = |a: [f64; 3], b: [f64; 3]| norm(minus(a, b)) / size;
-        let [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] = self.at_vertices(solver, &nodal)?;
         // How deep the pressed skin has gone along the force.
         let along = force.map(|f| f / size);
         let u = solver.displacement_mm();
         let pressed = under.nodal_mpa.iter().zip(u).filter(|(p, _)| **p > 0.0);
         let depth_mm = pressed.map(|(_, u)| dot(*u, along)).fold(0.0, f64::max);
-        let work = solver.pressure_work_mj();
-        Ok(IncrementRecord {
-            depth_mm,
-            time_s: 0.0,
-            force_n: force,
-            pressure_mpa,
-            sed_dermis_mpa,
-            sed_epidermis_mpa,
-            shear_mpa: Vec::new(),
-            outside_calibration: self.outside_calibration(solver),
-            contact: solver.contact_rule(),
-            checks: Checks {
-                residual_relative: report.residual_relative,
-                contact_force_vs_pressure_integral: difference(
-                    self.integral_n(solver, &nodal),
-                    force,
-                ),
-                plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force),
-                energy_vs_work: (report.stored_mj + report.dissipated_mj - work).abs()
-                    / work.abs().max(f64::MIN_POSITIVE),
-                j_min: report.j_min,
-                penetration_mm_max: 0.0,
-                newton_iterations: report.effort.newton_iterations,
-                step_cuts: report.effort.cuts,
-                augmentations: report.effort.augmentations,
-                factorizations: report.effort.factorizations,
-                cg_iterations: report.effort.cg_iterations,
-            },
-            seconds: 0.0,
-        })
+        let work_mj = solver.pressure_work_mj();
+        let sides = Sides {
+            recorded_n: self.integral_n(solver, &nodal),
+            normal_n: force,
+            work_mj,
+            work_mj_max: work_mj.abs(),
+            gap_mm: 0.0,
+        };
+        Ok(self.recorded(solver, report, depth_mm, values, Vec::new(), &sides))
     }
 
     /// Force of the pressure that is recorded, N: what the mesh's nodes, or the atlas, do not show of

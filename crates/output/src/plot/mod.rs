@@ -1,6 +1,7 @@
 //! Charts as SVG: lines and labelled points on linear or logarithmic axes.
 
 mod labels;
+pub mod palette;
 mod scale;
 mod ticks;
 
@@ -69,16 +70,16 @@ pub struct Chart {
 }
 
 const SIZE_PX: (u32, u32) = (880, 560);
-/// Colours that stay apart for colour-blind eyes (Okabe & Ito 2008).
+/// Colours of the series, in their order.
 const COLOURS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(120, 120, 120),
+    palette::BLUE,
+    palette::VERMILION,
+    palette::GREEN,
+    palette::PURPLE,
+    palette::SKY,
+    palette::ORANGE,
+    BLACK,
+    palette::GREY,
 ];
 
 /// Writes a chart as SVG.

@@ -6,6 +6,7 @@ mod zone;
 use super::report;
 use labels::Labels;
 use papilla_engine::ladder::{Kind, Ladder, REFERENCE_SET, Rung};
+use papilla_output::plot::palette::{self, GREY};
 use plotters::coord::Shift;
 use plotters::coord::combinators::LogCoord;
 use plotters::element::DashedPathElement;
@@ -19,19 +20,17 @@ type Drawn = Result<(), Box<dyn std::error::Error>>;
 const PANEL_PX: (u32, u32) = (760, 600);
 const LEGEND_PX: u32 = 34;
 const FONT_PX: i32 = 13;
-const GREY: RGBColor = RGBColor(120, 120, 120);
 const KINDS: [Kind; 5] =
     [Kind::ClosedForm, Kind::Operator, Kind::Network, Kind::PublishedUNet, Kind::Fe];
 
-/// Colours that stay apart for colour-blind eyes (Okabe & Ito 2008).
 fn colour(kind: Kind) -> RGBColor {
     match kind {
-        Kind::ClosedForm => RGBColor(204, 121, 167),
-        Kind::Operator => RGBColor(0, 158, 115),
-        Kind::Network => RGBColor(0, 114, 178),
-        Kind::PublishedUNet => RGBColor(213, 94, 0),
+        Kind::ClosedForm => palette::PURPLE,
+        Kind::Operator => palette::GREEN,
+        Kind::Network => palette::BLUE,
+        Kind::PublishedUNet => palette::VERMILION,
         // Floors have no time and are not drawn.
-        Kind::Fe | Kind::Floor => RGBColor(60, 60, 60),
+        Kind::Fe | Kind::Floor => palette::DARK,
     }
 }
 
