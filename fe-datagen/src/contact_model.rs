@@ -1,4 +1,5 @@
-//! The contact model of a finger: what the real-time contact solver has to know of it.
+//! Computes the contact model of a finger: what the contact solver of the service needs to know of
+//! it.
 
 use anyhow::Context;
 use papilla_atlas::{Atlas, MAP_LEN, Patch, VertexSampler};

@@ -1,4 +1,4 @@
-//! The influence operator on disk: `operator.npz` and `operator.json`.
+//! Writes the influence operator: `operator.npz` and `operator.json`.
 
 use papilla_fingertip::influence::{COMPONENTS, InfluenceOperator, Quality};
 use papilla_fingertip::mesh::fingertip::{Density, Order};

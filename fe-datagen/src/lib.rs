@@ -1,4 +1,4 @@
-//! Campaigns of indentations into datasets, and the command line over all that is offline.
+//! Solves campaigns into datasets, and holds the command line of simulations.
 //!
 //! ```
 //! use papilla_dataset::{Sample, testing};

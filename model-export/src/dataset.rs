@@ -1,5 +1,5 @@
-//! A dataset as models are judged by it: its maps, what pressed in each indentation, where errors are
-//! taken.
+//! A dataset for the evaluation of models: its maps, the indenter of each simulation, and the
+//! pixels over which errors are taken.
 
 use crate::ExportError;
 use crate::metrics::Ground;

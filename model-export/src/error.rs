@@ -1,4 +1,4 @@
-//! What can go wrong between a model and its card.
+//! What can go wrong when a model is checked, evaluated or described.
 
 use crate::part::Part;
 use papilla_dataset::DatasetError;

@@ -1,5 +1,5 @@
-//! Friction: from where an indenter is, on its way there, to force, traction and SED, against FE with
-//! friction.
+//! Errors of contact with friction against FE with friction: force, traction and SED, along the
+//! path of the indenter.
 
 use crate::ExportError;
 use crate::contact::{Models, Placed, Rung, pixel_contact};

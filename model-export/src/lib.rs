@@ -1,10 +1,10 @@
 //! Checks, evaluates and describes exported Papilla models.
 //!
-//! The trainer (Python, in `trainer/`) ends at the `.onnx` file. From there on everything
-//! is here: [`evaluate`] runs the serving engine on every held-out indentation of a dataset
-//! and compares with the finite-element truth by the [`metrics`]; the outcome is the
-//! model's [card](papilla_engine::card) and [pictures](picture) of its best, median and worst
-//! sample. The dataset is read from its files alone: nothing here knows how it was made.
+//! The trainer (Python, in `trainer/`) writes an `.onnx` file. Everything after that is here.
+//! [`evaluate`] runs the engine of the service on every held-out simulation of a dataset, and compares
+//! its answers with the finite-element truth by the [`metrics`]. The result is the model's
+//! [card](papilla_engine::card), with [pictures](picture) of its best, median and worst sample. The
+//! dataset is read from its files alone; nothing here depends on how it was made.
 //!
 //! ```
 //! use papilla_model_export::metrics::{Ground, SampleMetrics};

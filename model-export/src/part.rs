@@ -1,4 +1,4 @@
-//! Which part of a dataset a model is judged by.
+//! The option `--split`: which part of a dataset a model is evaluated on.
 
 use papilla_dataset::Split;
 use std::{fmt, str::FromStr};

@@ -1,4 +1,4 @@
-//! Processor time: what else the machine does does not count.
+//! Processor time, which does not count the work of other programs.
 
 /// Of this thread, s.
 pub(crate) fn thread_s() -> f64 {

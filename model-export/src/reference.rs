@@ -1,4 +1,4 @@
-//! Holds the serving engine against another engine on the same model.
+//! Compares the engine of the service with another engine on the same model.
 
 use crate::{ExportError, read};
 use ndarray::{Array3, Ix3};

@@ -1,5 +1,5 @@
-//! What traction along the skin is worth: SED of a network alone, and with what layered skin makes of
-//! the traction, against FE with friction.
+//! What traction along the skin is worth: the error of SED by a network alone, and with the part
+//! that layered skin adds for the traction, against FE with friction.
 
 use crate::ExportError;
 use crate::contact::Models;

@@ -1,4 +1,4 @@
-//! Accuracy against time, as a Markdown table of several cards.
+//! A Markdown table of accuracy against time from several cards.
 
 use papilla_engine::Card;
 use papilla_engine::card::Spread;

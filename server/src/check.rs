@@ -1,4 +1,4 @@
-//! `papilla-server check`: is everything in order, without serving anything?
+//! `papilla-server check`: looks at settings, models, port and limits, and serves nothing.
 
 use std::{fmt, fs, io, net::TcpListener, path::Path, time::Instant};
 

@@ -1,4 +1,4 @@
-//! File descriptors: each connection is one, and the system gives a process so many.
+//! File descriptors: each connection takes one, and the system limits how many a process may have.
 
 use crate::config::Config;
 

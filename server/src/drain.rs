@@ -1,4 +1,4 @@
-//! The end of the service, as those who must be waited for see it.
+//! How tasks learn that the service drains: that it accepts nothing new and is about to end.
 
 use tokio::sync::watch;
 

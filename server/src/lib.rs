@@ -7,13 +7,14 @@
 //! core:      scheduler: slot ─► queue ─► thread (own engine sessions, own buffers) ─► answer
 //! ```
 //!
-//! Crates of their own lie below: `papilla-codec` reads and writes maps, `papilla-session-effects`
-//! computes what sessions ask for beside them, `papilla-engine` runs the networks. Each layer knows those below it alone, and no module imports another in a circle.
+//! It uses crates of the workspace: `papilla-codec` reads and writes maps, `papilla-session-effects`
+//! computes what sessions ask for beside maps, `papilla-engine` runs the networks. Each layer uses
+//! only those below it, and no modules import each other in a circle.
 //!
-//! **Invariant:** tokio only moves bytes, on threads of the service's own (`runtime`): clients
-//! cannot starve the task that starts and drains it. Decoding, inference and encoding run on the
-//! pool's threads. **Invariant:** every queue is bounded and every wait is timed. **Invariant:** a
-//! frame that was accepted is answered exactly once.
+//! **Invariant:** tokio only moves bytes, on threads of its own (`runtime`), so that clients cannot
+//! starve the task that starts and drains the service. Decoding, inference and encoding run on the
+//! threads of the pool. **Invariant:** every queue is bounded and every wait is timed.
+//! **Invariant:** a frame that was accepted is answered exactly once.
 //!
 //! [`start`](fn@start) runs the whole service inside a process; the binary does little more:
 //!

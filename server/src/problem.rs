@@ -1,4 +1,5 @@
-//! The refusals of the service, whatever carries them: typed, in words of bounded length.
+//! The errors that the service tells its clients, whatever protocol carries them: typed, with
+//! messages of bounded length.
 
 use papilla_proto::{ErrorCode, FrameError, Problem, error::shortened};
 

@@ -1,4 +1,4 @@
-//! How far the start has come: what `/readyz` says until it is over.
+//! How far the start is. `/readyz` tells it until the start is over.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

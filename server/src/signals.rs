@@ -1,4 +1,4 @@
-//! What the system or a person asks of the process.
+//! Signals of the system, or of a person at the keyboard, to the process.
 
 use std::io;
 

@@ -1,6 +1,6 @@
 //! The log on stderr, and spans for a collector of traces (cargo feature `otlp`).
 //!
-//! Without a collector nobody wants the spans, and making one costs a comparison.
+//! Without a collector no spans are made, which costs one comparison each time.
 
 use std::{
     future::Future,

@@ -1,4 +1,4 @@
-//! How near an answer comes to the one that is due. All slices are as long as the mask.
+//! How close an answer is to the truth. All slices have the length of the mask.
 
 /// `|found - due| / |due|` over the pixels of the mask; 0 where nothing is due and found.
 #[must_use]

@@ -1,4 +1,4 @@
-//! What runs a network.
+//! The engines that can run a network.
 
 use std::{fmt, str::FromStr};
 

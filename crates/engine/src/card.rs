@@ -1,7 +1,7 @@
-//! Model cards and the index of the shipped models.
+//! The cards of models, and the index of a folder of models.
 //!
-//! A card (`models/NAME.json`) is what `model-export evaluate` measured of
-//! `models/NAME.onnx` in this engine on indentations that no training saw.
+//! A card (`models/NAME.json`) holds what `model-export evaluate` measured of `models/NAME.onnx` in
+//! this engine, on simulations that no training saw.
 
 use crate::{EngineError, MODEL_FORMAT, ModelInfo};
 use papilla_proto::{InputStatistics, json};

@@ -1,4 +1,4 @@
-//! Which backend runs a model: the one that is named, or the faster one.
+//! Which engine runs a model: the one that is named, or the faster one.
 
 use crate::{Backend, Card, EngineError, MAP_LEN, Model, Session, load_with, trial_map};
 use serde::{Serialize, Serializer};

@@ -1,11 +1,11 @@
 //! How wrong one answer is likely to be, from what it shows.
 //!
 //! A [`Law`] states the error of an answer as two quantiles: half of such answers err less than the
-//! first, nine of ten less than the second. The logarithm of each is linear in the answer's
-//! [`Facts`], logarithms of what pressure, contact and SED show. `model-export calibrate` fits the
-//! laws to finite-element simulations that no training saw, and writes `errors.json` beside the
-//! models. Where an answer shows more or less of something than any of those simulations, or where a
-//! network or a way to its pressure was not calibrated, nothing is stated.
+//! first, nine of ten less than the second. The logarithm of each is linear in the [`Facts`] of the
+//! answer. Most facts are logarithms of numbers that pressure, contact and SED show. `model-export
+//! calibrate` fits the laws to finite-element simulations that no training saw, and writes
+//! `errors.json` beside the models. Nothing is stated if a fact is out of the range for which the law
+//! was calibrated, or if the network, or the method that found its pressure, was not calibrated.
 //!
 //! ```
 //! use papilla_engine::error_law::{Fact, Facts, Law, Term};

@@ -1,4 +1,5 @@
-//! Runs tract's code: its errors and panics become ours, and its panics leave the log alone.
+//! Calls tract: its errors and panics become errors of this crate, and its panics are not written
+//! to the log.
 
 use crate::{Backend, EngineError};
 use std::any::Any;

@@ -1,4 +1,4 @@
-//! What a model says of itself.
+//! What a model file says about itself.
 
 use crate::{EngineError, MAP_SIDE_PX, MODEL_FORMAT};
 use serde::Serialize;

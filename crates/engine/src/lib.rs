@@ -1,9 +1,9 @@
-//! Runs a Papilla model: ONNX and its card behind a small trait.
+//! Runs Papilla models, which are ONNX files with a card, behind a small trait.
 //!
 //! A model maps the pressure on the skin (Pa) to the strain energy density at the
 //! dermis-epidermis interface (J/m3), both 224 x 224 maps, row-major, row 0 at the tip
-//! of the finger. [`load`] checks everything a file can get wrong before the first
-//! map is inferred: that it is whole, that its input and output are the contract's,
+//! of the finger. Before the first map is inferred, [`load`] checks whatever can be wrong with
+//! a file: that it is whole, that its input and output are the contract's,
 //! that its weights are finite, that it belongs to its card, and that it answers a
 //! trial map with finite, non-negative values.
 //!
@@ -20,9 +20,9 @@
 //! # }
 //! ```
 //!
-//! The backend is tract, pure Rust and embedded. The cargo feature `ort` adds ONNX
-//! Runtime, faster on large networks; its shared library is opened at
-//! run time from `ORT_DYLIB_PATH`. A [`Choice`] takes the faster of the two for each model.
+//! The engine (backend) is tract, which is pure Rust and embedded. The cargo feature `ort` adds ONNX
+//! Runtime, which is faster on large networks; its shared library is opened at run time from
+//! `ORT_DYLIB_PATH`. A [`Choice`] takes the faster of the two for each model.
 
 pub mod agreement;
 mod backend;

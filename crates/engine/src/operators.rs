@@ -1,9 +1,9 @@
-//! Which operators a graph may use, and how much it may make of the constants in the file.
+//! Which operators a graph may use, and how large the results of its constants may be.
 //!
-//! tract computes what depends on constants alone while it reads a model, before shapes can be
-//! looked at, and an allocation that fails there may end the process. A kilobyte of file
-//! (`Pad` by 2^38, an outer product of two long lists) is enough. So only operators are taken whose
-//! output is no longer than their inputs or their attributes say, and those are checked here.
+//! While tract reads a model, it computes what depends on constants alone. At that time no shapes
+//! can be looked at, and an allocation that fails may end the process. A file of a kilobyte is
+//! enough (`Pad` by 2^38, an outer product of two long lists). So only those operators are accepted
+//! whose output is no longer than their inputs or attributes say, and these are checked here.
 
 use crate::{EngineError, MAP_SIDE_PX, tract_backend::TENSOR_LEN_MAX};
 use std::collections::{HashMap, HashSet};

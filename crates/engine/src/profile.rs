@@ -1,4 +1,5 @@
-//! Where the time of a model goes in tract: its operators, each with what it reads and computes.
+//! How the time of a model in tract is divided among its operators, and what each of them reads and
+//! computes.
 
 use crate::tract_backend::{SHAPE, TractModel};
 use crate::{EngineError, checked, convolution, guard::guarded, products, sparse, trial_map};

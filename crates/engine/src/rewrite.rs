@@ -1,4 +1,4 @@
-//! How operators of our own get into a graph.
+//! Puts operators of this crate into a graph of tract, in place of those that they replace.
 
 use tract_onnx::tract_core::internal::*;
 

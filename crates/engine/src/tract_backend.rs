@@ -1,4 +1,4 @@
-//! tract, the backend that is always there.
+//! tract, the engine that is always there.
 
 use crate::{
     Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,

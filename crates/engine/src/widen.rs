@@ -1,8 +1,8 @@
-//! Constants stored in 16 bits, brought to the type that the graph works in.
+//! Constants that are stored in 16 bits, converted to the type of the graph.
 //!
-//! The trainer stores large constants as `float16` or `int16` where nothing is lost by it,
-//! with a `Cast` behind. tract folds such a cast only up to a size, and would else cast
-//! anew for every map.
+//! The trainer stores large constants as `float16` or `int16` where nothing is lost by it, followed
+//! by a `Cast`. tract folds such a cast only up to a certain size, and would otherwise cast again
+//! for every map.
 
 use half::f16;
 use std::collections::HashMap;

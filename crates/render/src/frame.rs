@@ -1,4 +1,4 @@
-//! The order of a frame, from pressure to SED, written once for the service and the native library.
+//! The steps of a frame, from pressure to SED, written once for the service and the native library.
 
 use papilla_engine::error_law::{ErrorLaws, Facts, Way};
 use papilla_engine::{EngineError, Session};

@@ -1,7 +1,7 @@
-//! One frame around the network: pressure is checked, judged and clamped before it, SED goes to the
-//! person after it.
+//! What is done with one frame around the network. Before it, pressure is checked, compared with the
+//! training and limited to its range. After it, SED is scaled to the person's finger.
 //!
-//! Whoever renders owns [`Maps`] and an engine session: a thread of the service, or a program that
+//! To *render* is to compute the answer of a frame. Whoever renders owns [`Maps`] and an engine session: a thread of the service, or a program that
 //! links the native library. Nothing here allocates after [`Maps::default`].
 //!
 //! ```

@@ -1,4 +1,4 @@
-//! What a hello announces: objects and fingers.
+//! Objects and fingers as a hello announces them: read and checked.
 
 use papilla_contact::{FRICTION_MAX, Object, Person};
 use papilla_proto::{

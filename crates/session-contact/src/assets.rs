@@ -1,4 +1,4 @@
-//! The contact model of a service, and what a frame takes with it.
+//! The contact model of a service, and the time that a frame takes with it.
 
 use std::{
     sync::{Arc, OnceLock},

@@ -1,4 +1,4 @@
-//! What contact tells of its own error.
+//! The facts of a contact by which the error of its force is estimated.
 
 use papilla_contact::{Contact, Person};
 use papilla_proto::contact::ContactMethod;

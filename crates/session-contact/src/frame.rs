@@ -1,4 +1,4 @@
-//! Which frames a session takes.
+//! The form of the frames of a session, and whether a frame has it.
 
 use papilla_proto::{
     ErrorCode, FrameHeader, FrameKind, FrameStatus, Hello, MAP_SIDE_PX, Problem, SampleType,

@@ -1,4 +1,4 @@
-//! Frames of gaps: depths, and how fast things move along the skin.
+//! Frames of gaps: depths, and how fast objects move along the skin.
 
 use papilla_contact::Gaps;
 use papilla_proto::{

@@ -1,8 +1,9 @@
 //! Contact of a session's fingers: what a hello announces, frame by frame.
 //!
-//! A [`Hand`] is made of a hello; it says which frames fit. Each of its fingers is a [`Finger`] with
-//! a solver of its own: [`Finger::take`] reads a frame into pressure, [`Finger::write`] appends what
-//! pushes back. All memory is taken at the hello, and what the hello did not name costs nothing.
+//! A [`Hand`] is made from a hello, and says which form frames must have. Each of its fingers is a
+//! [`Finger`] with a solver of its own: [`Finger::take`] reads a frame and finds the pressure,
+//! [`Finger::write`] appends force, torque and the like to the answer. All memory is taken at the
+//! hello, and what the hello did not name costs nothing.
 //!
 //! ```
 //! use papilla_proto::{ErrorCode, Hello, contact::Input};

@@ -1,4 +1,4 @@
-//! What finds a finger's pressure: a solver, and pixels if the hello asks for them.
+//! The solver of a finger: contact at vertices, and on pixels if the hello asks for it.
 
 use std::sync::Arc;
 

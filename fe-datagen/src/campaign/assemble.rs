@@ -1,4 +1,4 @@
-//! The manifest, assembled from the records of all indentations.
+//! Makes the manifest of a dataset from the records of all simulations.
 
 use super::CampaignError;
 use super::state::{IndentationState, Outcome, SOFTWARE};

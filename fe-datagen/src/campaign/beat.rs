@@ -1,4 +1,5 @@
-//! What a process tells of itself in `DIR/progress`, for `dataset status`. Nothing is decided by it.
+//! What a process writes about its progress into `DIR/progress`, for `dataset status`. No decision
+//! depends on it.
 
 use papilla_fingertip::campaign::Slice;
 use papilla_output::{OutputError, atomic};

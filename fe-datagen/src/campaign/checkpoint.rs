@@ -1,4 +1,4 @@
-//! Where an indentation stands, from process to process.
+//! Checkpoints: how far a simulation has come, stored so that another process can go on with it.
 
 use super::BoxError;
 use papilla_output::OutputError;

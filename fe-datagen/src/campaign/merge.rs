@@ -1,4 +1,4 @@
-//! The dataset, from what slices have left in a folder.
+//! Makes the dataset from what the slices of a campaign have left in a folder.
 
 use super::assemble::manifest;
 use super::state::{Found, Workspace};

@@ -1,10 +1,11 @@
-//! Campaigns: many indentations of one finger, solved in parallel into a dataset.
+//! Campaigns: many simulations of one finger, solved in parallel into a dataset.
 //!
-//! A campaign is a TOML file ([`CampaignSpec`]). [`solve`] solves the indentations of one [`Slice`] of
-//! it, one per core; any number of slices may share a folder, and a serial run is the slice of all.
-//! [`merge`] writes the dataset that [`papilla_dataset`] describes. All can be killed at any instant and started again: every indentation is one shard,
-//! written atomically, with a record in `DIR/progress` written after it. The dataset's
-//! bytes depend on the campaign alone, not on slices, threads, kills or the clock.
+//! A campaign is a TOML file ([`CampaignSpec`]). [`solve`] solves the simulations of one [`Slice`] of
+//! it, one on each core. Any number of slices may share a folder; a run without slices is one slice
+//! that holds all. [`merge`] writes the dataset, in the format of [`papilla_dataset`]. Every process
+//! can be killed at any time and started again: a simulation is one shard, which is written
+//! atomically, and then a record of it is written into `DIR/progress`. The bytes of the dataset depend
+//! on the campaign alone, not on slices, threads, kills or the clock.
 //!
 //! [`CampaignSpec`]: papilla_fingertip::campaign::CampaignSpec
 //! [`Slice`]: papilla_fingertip::campaign::Slice

@@ -1,4 +1,4 @@
-//! What a slice and a merged campaign say of themselves.
+//! The reports of a slice and of a merged campaign.
 
 use super::state::{IndentationState, Outcome};
 use papilla_dataset::{DroppedSample, FailedIndentation};

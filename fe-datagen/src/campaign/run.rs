@@ -1,4 +1,4 @@
-//! Solving the indentations of a slice in parallel.
+//! Solves the simulations of a slice in parallel.
 
 use super::beat::{Beat, Ended};
 use super::queue::{Queue, Settled, settled};

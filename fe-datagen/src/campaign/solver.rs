@@ -1,4 +1,4 @@
-//! What solves an indentation, and how a campaign is run.
+//! The solver of a simulation as the campaign sees it, and the options of a run.
 
 use super::{Checkpoints, PressError};
 use papilla_dataset::Sample;

@@ -1,7 +1,8 @@
 //! What a campaign remembers between processes, in `DIR/progress`.
 //!
-//! Many processes write there at once, on a network file system too, without locks: every file is
-//! whole or absent, has one content whoever writes it, and is vouched for by a record.
+//! Many processes write there at once, also on a network file system, and there are no locks. So
+//! every file is either whole or absent, has the same content whichever process writes it, and
+//! counts only if a record names it.
 
 use super::CampaignError;
 use papilla_atlas::Atlas;

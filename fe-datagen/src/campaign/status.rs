@@ -1,4 +1,4 @@
-//! How far the slices of a campaign are, from the files that they leave.
+//! How far the slices of a campaign are, read from the files that they leave.
 
 use super::beat::{BEAT, Beat};
 use super::state::{Found, IndentationState, Outcome, Workspace};

@@ -1,4 +1,4 @@
-//! What options name, and what they stand for in the libraries.
+//! The choices that options accept, and the variants of the libraries that they stand for.
 
 use papilla_calculix as calculix;
 use papilla_fingertip::mesh::fingertip;

@@ -1,4 +1,4 @@
-//! `contact`: what the real-time contact solver has to know of the finger.
+//! `contact`: computes the contact model of the finger, for the contact solver of the service.
 
 use crate::contact_model::{self, Recipe};
 use papilla_output::atomic;

@@ -1,4 +1,4 @@
-//! `explain` of a campaign: what a task of a cluster has to ask for.
+//! `explain` of a campaign: the time and memory that each task of a cluster job needs.
 
 use super::print;
 use papilla_fingertip::campaign::{CampaignSpec, Candidate, Indentation, indentations};

@@ -1,4 +1,4 @@
-//! `export`: a scene as an input deck of another solver.
+//! `export`: writes a scene as an input deck of CalculiX.
 
 use super::choices::{LinearHex, QuadraticHex};
 use anyhow::Context as _;

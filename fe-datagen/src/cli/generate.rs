@@ -1,4 +1,4 @@
-//! `generate`: a slice of a campaign of indentations, or all of it into a dataset.
+//! `generate`: solves a campaign into a dataset, or one slice of it.
 
 use super::campaign_file::CampaignFile;
 use super::part::Part;

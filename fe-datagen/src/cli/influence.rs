@@ -1,4 +1,4 @@
-//! `operator`: the finger's own influence operator.
+//! `operator`: computes the influence operator of the finger, strain as a linear map of pressure.
 
 use super::choices::Density;
 use super::print;

@@ -1,4 +1,4 @@
-//! The part of long work that a process takes.
+//! The option `--slice`: the part of a campaign that this process solves.
 
 use papilla_fingertip::campaign::{Slice, SliceError};
 

@@ -1,4 +1,4 @@
-//! How a scheduler asks a process to leave: it stores where it stands and goes.
+//! Signals by which a scheduler asks a process to end: the process stores its state and ends.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

@@ -1,4 +1,4 @@
-//! `stability`: the named suite of hard cases, and random scenes by the thousand.
+//! `stability`: a suite of hard cases with names, and thousands of random scenes.
 
 use super::part::Part;
 use super::{CHECKS_FAILED, choices, print, wrong_usage};

@@ -1,4 +1,4 @@
-//! `verify`: the solver against closed forms, published values and itself.
+//! `verify`: compares the solver with closed forms, with published values and with itself.
 
 use super::{CHECKS_FAILED, print};
 use anyhow::Context;

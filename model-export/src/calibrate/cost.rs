@@ -1,4 +1,4 @@
-//! What stating an error adds to a frame.
+//! How much time an error estimate adds to a frame.
 
 use papilla_engine::error_law::{Facts, Law};
 use papilla_engine::{MAP_LEN, Model};

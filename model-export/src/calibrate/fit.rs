@@ -1,4 +1,4 @@
-//! Laws of errors fitted to cases, and checked on others.
+//! Fits laws of errors to some states, and checks them on others.
 
 use super::quantile::{Table, conformal_quantile, dot};
 use super::{Case, SETS, Set};

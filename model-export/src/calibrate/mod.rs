@@ -1,8 +1,8 @@
 //! How wrong an answer is likely to be: laws of the errors of networks and contact, fitted to
 //! simulations that no training saw, and checked on others.
 //!
-//! [`States::of`] asks networks and contact about the states, [`Outcome::of`] fits and checks the
-//! [laws](papilla_engine::error_law), [`report`] words what came of it.
+//! [`States::of`] computes the answers for the states, [`Outcome::of`] fits and checks the
+//! [laws](papilla_engine::error_law), and [`report`] writes the page about them.
 
 mod cost;
 mod fit;

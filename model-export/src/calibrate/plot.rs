@@ -1,4 +1,4 @@
-//! The reliability diagram: true errors against the bounds that were stated of them.
+//! The reliability diagram: true errors over the bounds that were stated for them.
 
 use super::{Fitted, GROUPS};
 use crate::metrics::quantile;

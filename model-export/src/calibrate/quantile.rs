@@ -1,4 +1,4 @@
-//! Linear quantile regression of few numbers on few facts.
+//! Linear quantile regression on few facts and few states.
 
 /// What is fitted to: `values` by rows of as many numbers each as there are coefficients to find,
 /// the constant 1 first, and the weight of each row.

@@ -1,4 +1,5 @@
-//! What networks and contact err in states that no training saw, and what their answers show of it.
+//! The errors of networks and contact in states that no training saw, and the facts that their
+//! answers show.
 
 use super::{METHODS, SETS, Set};
 use crate::contact::{Models, Placed, Rung, pixel_contact};

@@ -1,4 +1,4 @@
-//! The pressure that contact on pixels makes of a dataset's indentations, for the trainer.
+//! The pressure that contact on pixels finds for the states of a dataset, for the trainer.
 
 use super::{Models, Placed, Rung, pixel_contact};
 use crate::ExportError;

@@ -1,5 +1,5 @@
-//! The contact ladder: from where things are to pressure, force and SED, against FE, and what that
-//! takes.
+//! The contact ladder: errors of pressure, force and SED of each contact method against FE, given
+//! the pose of the indenter, and the time that the method takes.
 
 mod maps;
 mod placed;

@@ -1,4 +1,4 @@
-//! Where an indenter of a dataset stands, in the finger's frame.
+//! Where the indenter of a simulation in a dataset stands, in the finger's frame.
 
 use crate::ExportError;
 use crate::dataset::Dataset;

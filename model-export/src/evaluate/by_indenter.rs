@@ -1,4 +1,4 @@
-//! Where a model errs: its figures by the indenter that pressed.
+//! The errors of a model by indenter.
 
 use super::Evaluation;
 use crate::metrics::{SampleMetrics, quantile};

@@ -1,7 +1,7 @@
-//! FE rungs: the reference's indentations on other meshes.
+//! FE rungs: the simulations of the reference on other meshes.
 //!
-//! `fe-datagen generate CAMPAIGN --mesh NAME` makes the dataset of each. A state is the same if
-//! indentation and depth are; the reference's SED is the truth, pixel by pixel.
+//! `fe-datagen generate CAMPAIGN --mesh NAME` makes the dataset of each mesh. Two states are the
+//! same if simulation and depth are. The truth is the SED of the reference, pixel by pixel.
 
 use super::sets::draw;
 use super::{Canvas, SampleSet};

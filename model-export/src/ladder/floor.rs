@@ -1,4 +1,5 @@
-//! Floors: one map for every pressure. A model that is no better has learnt nothing of it.
+//! Floors: ways that answer with the same map whatever the pressure is. A model that is no better
+//! has learnt nothing from the pressure.
 
 use super::sets::TRAINING;
 use super::sets::draw;

@@ -1,7 +1,7 @@
 //! The shipped ladder with the times of this machine.
 //!
-//! Errors do not depend on the machine, so they are taken from `ladder.json`; the times of every
-//! model are measured anew, in each engine that is here.
+//! Errors do not depend on the machine, so they are taken from `ladder.json`. The times of every
+//! model are measured anew, in each engine that this machine has.
 
 use super::{Progress, Timing, machine, model};
 use crate::{ExportError, read, read_text};

@@ -1,9 +1,9 @@
-//! The ladder: every way of getting a SED map, measured on the same held-out sets.
+//! The ladder: every way to a map of SED, measured on the same held-out sets.
 //!
-//! Servable rungs are the models of `models/index.json`, run in the serving engine on one
-//! thread; FE rungs are the reference's presses, solved on other meshes. What is not there is
-//! reported as not measured. The outcome is a [`Ladder`], from which [`report`] makes the
-//! table and [`plot`] the pictures.
+//! The rungs that can be served are the models of `models/index.json`, run in the engine of the
+//! service on one thread. FE rungs are the simulations of the reference, solved on other meshes.
+//! What is missing is reported as not measured. The result is a [`Ladder`], from which [`report`]
+//! makes the page and [`plot`] the pictures.
 
 mod fe;
 mod floor;

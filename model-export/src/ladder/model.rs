@@ -1,4 +1,4 @@
-//! A servable rung: errors, refusals, times and footprint of one model.
+//! The rung of one model: errors, refusals, times and memory.
 
 use super::readings::Pairs;
 use super::sets::draw;

@@ -1,8 +1,8 @@
-//! What a pressure map itself is worth: one state's pressure, read on two meshes.
+//! What a pressure map itself is worth: the pressure of the same state, computed on two meshes.
 //!
-//! A network cannot know better than the map that it is given. So the reference's pressure is held
-//! against the next finest mesh's, as read and averaged over a tenth of a millimetre, and each
-//! model's answers to the two against each other.
+//! A network cannot know more than its pressure map. So the pressure of the reference is compared
+//! with that of the next coarser mesh, as it is and averaged over a tenth of a millimetre. And the
+//! answers of each model to the two maps are compared with each other.
 
 use super::sets::draw;
 use super::{Canvas, SampleSet};

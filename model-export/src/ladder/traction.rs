@@ -1,4 +1,4 @@
-//! What traction along the skin is worth, of each model.
+//! What traction along the skin is worth for each model.
 
 use super::Task;
 use super::model::session;

@@ -1,7 +1,7 @@
-//! The settings file, laid under command line and environment.
+//! The settings file. Command line and environment take precedence over it.
 //!
-//! Every field of the file becomes the flag of the same name and is parsed by the same rules,
-//! so that there is one definition of what a setting may be.
+//! Every field of the file becomes the flag of the same name and is parsed by the same rules, so
+//! that there is one definition of what a setting may be.
 
 use std::{
     ffi::OsString,

@@ -1,4 +1,4 @@
-//! What the service can be told: by flag, by environment, by file; see [`Config`].
+//! The settings of the service, from flags, environment and file: [`Config`].
 
 mod error;
 mod file;

@@ -1,4 +1,4 @@
-//! Settings from all layers, and printing what came of them.
+//! Puts the settings of flags, environment and file together, and prints the result.
 
 use std::{ffi::OsString, fmt::Write};
 

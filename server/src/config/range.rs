@@ -1,4 +1,5 @@
-//! The numbers a setting may have: checked where it is read, and again where the service starts.
+//! The range of each number among the settings. It is checked where the number is read, and again
+//! when the service starts.
 
 use std::{ops::RangeInclusive, str::FromStr};
 

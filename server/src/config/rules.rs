@@ -1,4 +1,4 @@
-//! What settings mean together.
+//! Rules between settings: what a single setting does not show.
 
 use std::{num::NonZeroUsize, time::Duration};
 

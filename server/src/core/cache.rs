@@ -1,7 +1,7 @@
-//! Answers that do not change: made once, away from the threads that move bytes.
+//! Answers that do not change. Each is made once, on a thread that does not move bytes.
 //!
-//! The cache is bounded by what there is: a few forms of each state of the replay, of the atlas
-//! and of the page, each as it is and compressed.
+//! The cache is bounded by what can be asked for: a few forms of each state of the replay, of the
+//! atlas and of the page, each plain and compressed.
 
 use std::{
     collections::HashMap,

@@ -1,10 +1,9 @@
-//! What renders maps, whatever transport brings them.
+//! Computes maps, whatever transport brings the frames.
 //!
-//! `scheduler` takes jobs to the inference threads, by turns of sessions. `desk` works out hellos on
-//! threads of its own. `catalogue` holds the tiers, the atlas and the
-//! replay of one finger, `fingers` are those that clients can name; `reload` replaces and loads them
-//! while the service runs. `buffers` are used again from frame to frame.
-//! `latency` and `metrics` keep the times.
+//! `scheduler` takes jobs to the inference threads; sessions take turns. `desk` checks hellos on
+//! threads of its own. `catalogue` holds the tiers, the atlas and the replay of one finger, and
+//! `fingers` the fingers that clients can name. `reload` loads and replaces them while the service
+//! runs. `buffers` are used again from frame to frame. `latency` and `metrics` keep the times.
 
 pub(crate) mod buffers;
 pub(crate) mod cache;

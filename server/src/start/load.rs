@@ -1,4 +1,5 @@
-//! How much of its capacity the service is asked for: what autoscalers scale by.
+//! The load: thread time that all frames asked for, over the thread time that there is. Autoscalers
+//! go by it.
 
 use std::{
     sync::{Arc, atomic::Ordering},

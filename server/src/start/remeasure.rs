@@ -1,7 +1,8 @@
-//! Measuring again the tiers that nobody uses.
+//! Measures again the tiers that nobody uses.
 //!
-//! A tier that serves is measured by its frames. One that seemed slow because the machine was busy
-//! is chosen for no budget, serves nobody and would seem slow for good.
+//! The frames of a tier that is used measure it. But a tier that seemed slow, because the machine
+//! was busy at the time, is chosen for no budget. No frame would measure it, and it would seem slow
+//! forever.
 
 use std::{sync::Arc, time::Duration};
 

@@ -1,4 +1,4 @@
-//! What every route and session shares.
+//! The state that all routes and sessions share.
 
 use std::{
     path::PathBuf,

@@ -1,4 +1,4 @@
-//! What answers before the models are loaded: health at once, everything else once it can.
+//! Answers before the models are loaded: health checks at once, everything else as soon as it can.
 
 use std::{convert::Infallible, sync::Arc, time::Duration};
 

@@ -1,4 +1,4 @@
-//! What the client sends and what it wants back: `Content-Type`, `Accept` and the query.
+//! Which format the client sends, and which it wants back: `Content-Type`, `Accept` and the query.
 
 use axum::http::{HeaderMap, header};
 use papilla_codec::{Input, Output, is_npy, is_png};

@@ -1,7 +1,9 @@
-//! Accounts of those who post maps: one for each client, be it a token or an address.
+//! Accounts of clients that post maps, one for each client. A client is its token, or else its
+//! address.
 //!
-//! A session has an account of its own. Posts of one client come on as many connections as it likes,
-//! so that they share one; otherwise every post would be a newcomer without debts.
+//! A session has an account of its own. The posts of a client may come over as many connections as
+//! it likes. Without a common account, each post would count as a new client that has used no time
+//! yet.
 
 use std::{
     collections::HashMap,

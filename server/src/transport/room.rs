@@ -1,9 +1,10 @@
-//! Whether a client reads what it is sent.
+//! Finds out whether a client reads what it is sent.
 //!
-//! A client that reads slowly must not be taken for one that does not read. Linux calls a connection
-//! writable when a third of its room is free, which at 30 kB/s takes more than ten seconds. So while
-//! a write waits, the system is offered bytes again and again: it takes some as soon as the client's
-//! system has confirmed any, and that it does when the client has read.
+//! A client that reads slowly must not be taken for one that does not read. Linux reports a
+//! connection as writable only when a third of its send buffer is free, and at 30 kB/s that takes
+//! more than ten seconds. So while a write waits, bytes are offered to the system again and again.
+//! It takes some of them as soon as the client's system has confirmed any, which happens when the
+//! client has read.
 
 use std::{io, time::Duration};
 

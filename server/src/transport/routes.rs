@@ -1,4 +1,5 @@
-//! All routes, and what stands before them: one list, from which the router is built.
+//! All routes in one list, from which the router is built, and the checks that a request passes
+//! before it reaches a handler.
 
 use std::{
     path::Path,

@@ -1,4 +1,4 @@
-//! A TCP stream whose writes are timed: the client may take a while to read anything at all.
+//! A TCP stream whose writes are timed: a client has a limited time to read anything at all.
 
 use std::{
     io,

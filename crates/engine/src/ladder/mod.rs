@@ -1,7 +1,7 @@
-//! The ladder: every way of getting a SED map, with its error and its time.
+//! The ladder: every way to a map of SED, with its error and its time.
 //!
-//! `model-export ladder` measures it and writes `models/ladder.json`; the server embeds that
-//! file, publishes it, and chooses rungs by it.
+//! `model-export ladder` measures it and writes `models/ladder.json`. The server embeds that file,
+//! publishes it, and chooses tiers by it.
 
 use crate::card::{Metrics, Similarity, Spread};
 use crate::{Backend, EngineError, MODEL_FORMAT};

@@ -1,13 +1,14 @@
-//! The correction that looks at the eight blocks around: convolutions over 3 x 3 blocks, in fewer
-//! products.
+//! The correction that looks at the eight neighbours of a block: convolutions over 3 x 3 blocks,
+//! with fewer products than the sums as they are written.
 //!
-//! Winograd's way, F(4 x 4, 3 x 3): a tile of 4 x 4 sums depends on 6 x 6 values. Both the values
-//! and the weights are brought to 36 numbers by fixed linear maps; products of these, summed up over
-//! the inputs, give the tile's sums by a third fixed map. That is 36 products an input where the
-//! sums as they stand take 144. All is exact but for rounding.
+//! Winograd's method, F(4 x 4, 3 x 3): a tile of 4 x 4 sums depends on 6 x 6 values. A fixed linear
+//! map turns the values into 36 numbers, and another one the weights. The products of these numbers
+//! are summed over the inputs, and a third fixed map gives the sums of the tile. That takes 36
+//! products for each input, where the plain sums take 144. Apart from rounding the result is the
+//! same.
 //!
-//! Tiles are next to each other in the vectors. So a map lies as planes, one for each place within
-//! a tile, and the transforms need no shuffling.
+//! A vector holds the same place of neighbouring tiles. So a map is stored as planes, one for each
+//! place within a tile, and the transforms need no shuffling.
 
 use super::gain::Gain;
 use super::gated::{PAIRS, gated, padded, product};

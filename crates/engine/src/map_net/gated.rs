@@ -1,4 +1,5 @@
-//! Values and their gates: one convolution gives both, and their product is a hidden channel.
+//! Products of the correction: one convolution computes both factors, the value and its gate. The
+//! gate is limited to between -1 and 1, and their product is a hidden channel.
 
 use super::parts::CorrectionParts;
 use super::sums::GROUP;

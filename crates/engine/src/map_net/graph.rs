@@ -1,4 +1,4 @@
-//! Reading an ONNX graph from its output on.
+//! Reads an ONNX graph backwards, from its output to its inputs.
 
 use std::collections::HashMap;
 use tract_onnx::pb::{

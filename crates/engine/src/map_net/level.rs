@@ -1,4 +1,5 @@
-//! One level: what is linear in the pressures around and what comes from above, corrected.
+//! One level of a network on maps: what is linear in the pressures around a block, plus what comes
+//! from the level above, plus the correction.
 
 use super::correction::{AddAlone, Correction, CorrectionSpace};
 use super::near::{AddNear, Near};

@@ -1,17 +1,17 @@
-//! Networks on maps, run in passes over rows that stay in the nearest cache.
+//! Networks on maps, evaluated in passes over rows that stay in the nearest cache.
 //!
-//! The graph of such a network (`docs/concepts/networks.md`) says what is answered and tract can run
-//! it. But as a graph it does more than it has to:
+//! The graph of such a network (`docs/concepts/networks.md`) defines its answer, and tract can run
+//! it. But the graph does more work than is needed:
 //!
-//! - it interpolates components by a convolution over 3 x 3 pixels, where a mix of the components
-//!   and an interpolation by rows and columns give the same;
-//! - it computes what pressures give around them everywhere, though it is zero where no pressure is
-//!   near;
-//! - it writes and reads a map as large as the cache between any two operators.
+//! - It interpolates components by a convolution over 3 x 3 pixels. To mix the components first,
+//!   and then to interpolate by rows and columns, gives the same.
+//! - It computes the influence of pressures everywhere, although this is zero where no pressure is
+//!   near.
+//! - Between any two operators it writes and reads a map that is as large as the cache.
 //!
 //! So [`find`] looks for the network in the graph, operator by operator, and [`Runner`] evaluates
-//! it. Every file is compared on loading with tract's own answers to several maps. A graph that is
-//! not recognised, or is answered otherwise, stays tract's.
+//! it. When a file is loaded, the answers to several maps are compared with those of tract. If a
+//! graph is not recognised, or the answers differ, tract runs it.
 
 mod around;
 mod correction;

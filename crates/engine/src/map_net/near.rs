@@ -1,8 +1,9 @@
-//! What a level adds around pressures: a convolution of their blocks, times a gain.
+//! The near field of a level: a convolution over the blocks of pressures, times a gain.
 //!
-//! Each of the four pixels of a block has weights that are centred on it, so three tenths of the
-//! kernel's 3 x 3 blocks have none. Channels are therefore summed up pixel by pixel, not component
-//! by component: those of a group then lack the same taps.
+//! The weights of each of the four pixels of a block are centred on that pixel. So three tenths of
+//! the weights in a kernel over 3 x 3 blocks are zero. Sums are grouped by pixel and not by
+//! component, because the sums of one pixel have their zeros at the same places, which are then
+//! skipped.
 
 use super::gain::Gain;
 use super::parts::LevelParts;

@@ -1,4 +1,4 @@
-//! A network on maps, laid out for the evaluation, and where one thread works.
+//! A network on maps, laid out for the evaluation, and the working memory of one thread.
 
 use super::correction::Correction;
 use super::level::{Level, LevelSpace};

@@ -1,6 +1,6 @@
 //! Finds networks on maps in a graph, operator by operator, and takes their constants.
 //!
-//! Whatever differs in a single operator is none, and the graph is run as it stands.
+//! If a single operator differs, the graph is not such a network, and tract runs it as it stands.
 
 use super::graph::{Graph, attribute, inputs};
 use super::parts::{CorrectionParts, LevelParts, Parts};

@@ -1,4 +1,4 @@
-//! From a row's components to what comes next: components above, or densities of pixels.
+//! What a row of components becomes: the input of the next level, or energy densities of pixels.
 
 use super::sums::{GROUP, MARGIN, settled, vectors, vectors_mut};
 use super::upsampling::{Above, Upsampling};

@@ -1,4 +1,4 @@
-//! The pressures of a map as blocks of 2 x 2 pixels, at every level, and where there are any.
+//! The pressures of a map as blocks of 2 x 2 pixels, at every level, and which blocks have any.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! The global map of low rank, from the coarsest blocks to their components.
+//! The global map of low rank: from the pressures of the coarsest blocks to the components there.
 
 use super::sums::{settled, store, vectors};
 use super::upsampling::Above;

@@ -1,8 +1,9 @@
-//! Components of a level on the blocks of the next: mixed, then linear between pixels' middles.
+//! Components of a level on the blocks of the next finer one: mixed, then interpolated linearly
+//! between the centres of pixels.
 //!
 //! In the graph this is a convolution over 3 x 3 pixels. Its weights are a C x C matrix times the
-//! fixed weights of the interpolation, so the mix is done once for each pixel, the interpolation
-//! along rows once, and the one across rows from three rows that are in the cache.
+//! fixed weights of the interpolation. So here the mix is done once for each pixel, then the
+//! interpolation along rows, and last the one across rows, from three rows that are in the cache.
 
 use super::sums::{GROUP, MARGIN, Sums, in_vectors, store, vectors, vectors_mut};
 use pulp::Simd;

@@ -1,8 +1,9 @@
-//! Chains of moved axes, each run as one pass over the values.
+//! Chains of operators that move axes, each run as one pass over the values.
 //!
-//! Pixels become channels of blocks, and channels pixels, by a transposition. tract visits every
-//! value by an index of all axes: 40 us for 50176 values, as long as a convolution takes. Here the
-//! loops over them are found at load, and rows are copied, picked apart or interleaved.
+//! A transposition turns pixels into the channels of blocks, and channels into pixels. tract
+//! addresses every value by an index over all axes: 40 us for 50176 values, as long as a
+//! convolution takes. Here the loops are found when the model is loaded, and rows are copied, split
+//! or interleaved.
 
 mod reorder;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What is joined, handed on as it is.
+//! Hands joined columns on, so that tract does not take a product with them apart again.
 
 use tract_onnx::tract_core::internal::*;
 

@@ -1,9 +1,9 @@
-//! Products with constant matrices, kept in a form that runs fast for one map at a time.
+//! Products with constant matrices, stored in a form that is fast for one map at a time.
 //!
-//! tract takes a product with joined columns apart into one product for each part, and adds what
-//! they make: for a thousand rows of 49 values in seven parts that writes the result seven times.
-//! And it packs both sides of every product anew, which for many small products with two rows each
-//! takes longer than the products.
+//! tract splits a product with joined columns into one product for each part and adds the results.
+//! For a thousand rows of 49 values in seven parts, this writes the result seven times. And it
+//! packs both sides of every product anew. For many small products of two rows each, this takes
+//! longer than the products.
 
 mod joined;
 mod stacked;

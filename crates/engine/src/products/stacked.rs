@@ -1,4 +1,4 @@
-//! Many small products at once: rows of each part by the part's own matrix.
+//! Many small products at once: the rows of each part, times the matrix of that part.
 
 use pulp::{Arch, Simd, WithSimd};
 use std::sync::Arc;

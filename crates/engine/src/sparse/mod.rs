@@ -1,10 +1,10 @@
-//! Chains of picking, weighting and adding, each made one sparse linear map.
+//! Chains of picking, weighting and adding, each turned into one sparse linear map.
 //!
-//! A model samples the pressure of each vertex from a few pixels and gives each pixel the
-//! weighted densities of three vertices. As a graph that is `Gather`, `Mul` and `ReduceSum` over
-//! three times 50176 values, and tract spends more time on it than on all products of
-//! a small network: it works the constant indices out anew for every map, and writes every
-//! intermediate to memory. Here the chain becomes one pass over a table made at load.
+//! A model samples the pressure of each vertex from a few pixels, and gives each pixel the weighted
+//! densities of three vertices. In a graph this is `Gather`, `Mul` and `ReduceSum` over three times
+//! 50176 values. tract spends more time on it than on all products of a small network: it evaluates
+//! the constant indices anew for every map, and writes every intermediate result to memory. Here
+//! the chain becomes one pass over a table that is made when the model is loaded.
 
 mod map;
 mod terms;

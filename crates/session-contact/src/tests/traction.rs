@@ -1,4 +1,4 @@
-//! Friction of gaps, and traction that SED feels.
+//! Friction of gaps, and traction that changes SED.
 
 use papilla_proto::{PressureRange, effects::OutOfRange};
 

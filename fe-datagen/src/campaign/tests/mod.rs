@@ -1,5 +1,5 @@
-//! The runner's mechanics: slices, resume, threads, failures. The solver here is a
-//! formula of pose and depth; what it returns is of no matter to the runner.
+//! The mechanics of a run: slices, resuming, threads, failures. The solver here is a formula of
+//! pose and depth; its results do not matter.
 
 mod slices;
 

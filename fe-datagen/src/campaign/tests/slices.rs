@@ -1,4 +1,4 @@
-//! Many processes, one folder.
+//! Many processes that write into one folder.
 
 use super::*;
 use std::fs;

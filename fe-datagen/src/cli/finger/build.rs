@@ -1,4 +1,4 @@
-//! `finger build`: what the service needs of a finger, beside networks.
+//! `finger build`: computes the atlas and the contact model of a finger.
 
 use crate::cli::contact;
 use crate::contact_model::{MODES, OUTPUTS, Recipe};

@@ -1,4 +1,4 @@
-//! `finger explain`: what a finger's file says, and whether it can be meshed.
+//! `finger explain`: shows the numbers of a finger's file, and whether it can be meshed.
 
 use crate::cli::print;
 use papilla_fingertip::geometry::fingertip::SCALED_JACOBIAN_MIN;

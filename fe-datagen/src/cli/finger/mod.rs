@@ -1,4 +1,4 @@
-//! `finger`: a finger of one's own.
+//! `finger`: commands for fingers of one's own.
 
 mod build;
 mod explain;

@@ -1,4 +1,4 @@
-//! `finger new`: a file to begin with.
+//! `finger new`: writes a file with the numbers of the default finger.
 
 use papilla_fingertip::scene::Finger;
 use papilla_fingertip::scene::finger::{FINGER_FILE, Source};

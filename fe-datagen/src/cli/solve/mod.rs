@@ -1,4 +1,4 @@
-//! `solve`: one scene, with everything that can be looked at.
+//! `solve`: solves one scene and writes all its results.
 
 mod maps;
 mod press;

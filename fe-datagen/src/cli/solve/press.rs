@@ -1,4 +1,4 @@
-//! The press of one scene, shown and written state by state.
+//! Solves a scene, and shows and writes it state by state.
 
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::solve::Solver;

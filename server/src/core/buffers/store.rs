@@ -1,8 +1,8 @@
-//! Memory of sessions that are over, for those to come.
+//! Keeps the buffers of closed sessions for new ones.
 //!
-//! Given back to the allocator, the buffers of a session would lie in the arena of whichever thread
-//! opened it; each arena then grows to all sessions that thread ever had at once. Kept here, they
-//! are never more than the sessions that were open at the same time.
+//! If they were given back to the allocator, they would lie in the arena of the thread that opened
+//! the session. Each arena would then grow to all sessions that its thread ever had at once. Kept
+//! here, there are never more buffers than there were sessions at the same time.
 
 use std::{
     mem,

@@ -1,4 +1,4 @@
-//! Measuring tiers beside the frames: at the start, at a reload, and again while nobody is served.
+//! Measures the time of the tiers: at the start, at a reload, and again while nobody is served.
 
 use std::time::{Duration, Instant};
 

@@ -1,8 +1,9 @@
-//! Golden answers: what a model makes of FE states whose SED is known.
+//! Golden answers: the answers of a model for states of finite elements (FE) whose SED is known.
 //!
-//! A model that loads, belongs to its card and answers with finite values can still be the wrong
-//! one: other units, another orientation, an engine that computes it wrongly. So it is asked for
-//! the states of `replay.json`, and its answers are held against the FE solver's.
+//! A model may load, belong to its card and answer with finite values, and yet be the wrong one:
+//! with other units, another orientation, or an engine that computes it wrongly. So it is given the
+//! pressure of the states in `replay.json`, and its answers are compared with the SED of the FE
+//! solver.
 
 use std::sync::Arc;
 

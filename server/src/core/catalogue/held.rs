@@ -1,4 +1,4 @@
-//! What a tier has of its model: all of it, or nothing until a client names the tier.
+//! The model of a tier, which may not be loaded until a client names the tier.
 
 use std::{
     sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},

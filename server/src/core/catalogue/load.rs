@@ -1,4 +1,4 @@
-//! Reading single files of a model folder.
+//! Reads and checks single files of a folder of models.
 
 use std::{sync::Arc, time::Duration};
 

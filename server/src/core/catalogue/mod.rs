@@ -1,4 +1,4 @@
-//! The tiers this service can render with, their atlas, and the replay.
+//! The catalogue of one finger: its tiers, their atlas, and the replay.
 
 pub(crate) mod assets;
 pub(crate) mod calibrate;

@@ -1,4 +1,5 @@
-//! A few states of FE simulations shipped with the models, so that a visitor sees the error.
+//! The replay: a few states of FE simulations that are shipped with the models, so that a visitor
+//! of the page sees the error of the networks.
 
 use papilla_proto::json;
 use serde::Deserialize;

@@ -1,5 +1,5 @@
-//! The desk: where work is done that a client asks for before its frames, such as a hello with a
-//! mesh. It takes long, so it has few threads of its own, which serve no frames.
+//! The desk: threads for work that a client asks for before its frames, such as checking a hello
+//! that holds a mesh. Such work takes long, so these few threads serve no frames.
 //!
 //! ```text
 //! work ──► waiting (few of a client, bounded in all) ──► thread ──► result

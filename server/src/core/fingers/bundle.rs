@@ -1,4 +1,4 @@
-//! What a finger's folder holds: what it is made of, its atlas, networks and contact model.
+//! Reads the bundle of a finger: its description, atlas, networks and contact model.
 
 use std::{path::Path, sync::Arc};
 

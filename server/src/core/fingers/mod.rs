@@ -1,8 +1,8 @@
-//! The fingers of a service: the default one, which is that of the models, and those of a folder,
-//! each loaded when a client first names it.
+//! The fingers of a service: the default one, to which the models belong, and those of a folder.
+//! Each of the latter is loaded when a client first names it.
 //!
 //! **Invariant:** a finger keeps its place for the life of the process, as a tier keeps its own in
-//! its catalogue: jobs and sessions name tiers by a number that is made of both.
+//! its catalogue. Jobs and sessions name a tier by a number that is made of both places.
 
 mod bundle;
 

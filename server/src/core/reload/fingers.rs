@@ -1,8 +1,8 @@
-//! The fingers beside the default one: each is loaded when a client first names it, and reloaded with
-//! the models.
+//! The fingers beside the default one. Each is loaded when a client first names it, and reloaded
+//! together with the models.
 //!
-//! A finger is loaded once, one at a time and never beside a reload; clients find it when every
-//! thread has warm sessions of its tiers, and not before.
+//! One finger is loaded at a time, and never beside a reload. Clients find it only when every
+//! thread has prepared its tiers.
 
 use std::{
     collections::BTreeMap,

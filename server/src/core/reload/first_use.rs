@@ -1,9 +1,9 @@
-//! Models that are loaded while the service answers: when a client first names their tier, or by the
-//! start once the default tier answers.
+//! Models that are loaded while the service answers: when a client first names their tier, or by
+//! the start once the default tier answers.
 //!
-//! For the former neither the start nor memory pays before that. It is done once, one model at a time
-//! and never beside a reload; the tier answers when every thread has a warm session of it, and not
-//! before.
+//! A model that no client has named costs neither time at the start nor memory. It is loaded once,
+//! one model at a time, and never beside a reload. The tier answers only when every thread has
+//! prepared it.
 
 use std::{sync::Arc, time::Duration};
 

@@ -1,4 +1,5 @@
-//! Models that change while the service runs: load, check, warm, swap; or change nothing.
+//! Models that change while the service runs: they are read, checked and prepared, and then replace
+//! the old ones. If anything is wrong, nothing changes.
 
 mod fingers;
 mod first_use;

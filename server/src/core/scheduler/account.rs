@@ -1,4 +1,5 @@
-//! Whose turn it is: what the frames of one session have cost the threads.
+//! Accounts: what the frames of a session have cost the threads. They decide which session has the
+//! next turn.
 
 use std::{
     collections::VecDeque,

@@ -1,7 +1,7 @@
-//! How a reload brings new models to the threads without stopping them.
+//! How a reload hands new models to the threads without stopping them.
 //!
-//! The sessions are made and warmed elsewhere. A thread finds them in its inbox before its next
-//! job; until then it serves with the old ones.
+//! Engine sessions of the new models are made and warmed on another thread. Each inference thread
+//! finds them in its inbox before its next job; until then it goes on with the old ones.
 
 use std::sync::{
     Arc, Mutex, PoisonError,

@@ -1,4 +1,4 @@
-//! The one-frame slot of a session: the latest frame wins.
+//! The slot of a finger, in which one frame waits: a newer frame replaces it.
 
 use std::{
     mem,

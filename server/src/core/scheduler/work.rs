@@ -1,4 +1,4 @@
-//! One inference thread: decode, check, infer, encode.
+//! One inference thread: it decodes, checks, computes and encodes.
 
 use std::{
     mem,

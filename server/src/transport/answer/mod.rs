@@ -1,4 +1,5 @@
-//! What the protocols over HTTP share: bodies, answers, refusals, and posted maps.
+//! What all protocols over HTTP share: reading bodies, writing answers and refusals, computing
+//! posted maps.
 
 pub(crate) mod body;
 mod cached;

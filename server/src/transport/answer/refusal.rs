@@ -1,4 +1,5 @@
-//! Every refusal as one typed JSON answer, in the shape of the protocol of its path.
+//! Writes every refusal as one typed JSON answer, in the form of the protocol to which the path
+//! belongs.
 
 use axum::{
     body::Body,

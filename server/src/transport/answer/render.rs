@@ -1,4 +1,4 @@
-//! Posted maps on their way through the pool.
+//! The way of a posted map through the inference threads.
 
 use std::{sync::Arc, time::Duration};
 

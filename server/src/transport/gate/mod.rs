@@ -1,5 +1,5 @@
-//! Who may come in: tokens, origins, rates, and places for connections. Policy alone: it knows
-//! neither routes nor handlers.
+//! Who may come in: tokens, origins, rates, and places for connections. It holds the rules only,
+//! and uses neither routes nor handlers.
 
 mod origin;
 mod places;

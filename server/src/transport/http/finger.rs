@@ -1,4 +1,4 @@
-//! The fingers over HTTP: their list, and which of them a request asks about.
+//! The list of fingers over HTTP, and which finger a request is about.
 
 use std::{sync::Arc, sync::atomic::Ordering};
 

@@ -1,4 +1,4 @@
-//! What the service says of itself.
+//! What the service says about itself: health, metrics, tiers, models.
 
 use std::sync::{Arc, atomic::Ordering};
 

@@ -1,4 +1,4 @@
-//! The handlers of the HTTP surface, a room for each part of it.
+//! The handlers of the HTTP interface, a module for each part of it.
 
 pub(crate) mod admin;
 pub(crate) mod atlas;

@@ -1,4 +1,4 @@
-//! `/v1/presses`: the replay, states of FE simulations to hold the networks against.
+//! `/v1/presses`: the states of the replay, to compare networks with FE.
 
 use std::sync::Arc;
 

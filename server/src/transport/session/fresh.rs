@@ -1,4 +1,4 @@
-//! Which frames are stale: too old to be worth a rendering when they arrive.
+//! Which frames are stale: too old, when they arrive, to be worth computing.
 
 use std::time::{Duration, Instant};
 

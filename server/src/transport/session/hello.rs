@@ -1,4 +1,4 @@
-//! Hello and ready: at the start of a session, and whenever the client asks for new terms.
+//! Hello and ready: at the start of a session, and each time the client asks for new terms.
 
 use std::{sync::Arc, time::Instant};
 

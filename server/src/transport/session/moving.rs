@@ -1,4 +1,5 @@
-//! A session that moves: what it takes along, sealed, and how it goes on with that elsewhere.
+//! Sessions that move to another connection: what they take along, encrypted, and how they go on
+//! there.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},

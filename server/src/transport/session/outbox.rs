@@ -1,4 +1,5 @@
-//! What a session sends, whoever sends it: the task of the connection or the thread that rendered.
+//! The messages that a session sends, whether the task of the connection sends them or an inference
+//! thread.
 
 use std::{
     collections::VecDeque,

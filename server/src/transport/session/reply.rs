@@ -1,5 +1,5 @@
-//! Answers of a session: made and sent by the thread that rendered, or by the task if there was
-//! nothing to render.
+//! The answers of a session. The inference thread makes and sends an answer; if there was nothing
+//! to compute, the task of the connection does.
 
 use std::{
     sync::{

@@ -1,4 +1,4 @@
-//! The terms of a session: what its hello asked for, on the tier that meets it.
+//! The terms of a session: what its hello asked for, with the tier that serves it.
 
 use std::sync::{
     Arc, Mutex, PoisonError,

@@ -1,4 +1,4 @@
-//! The evaluation by rows against tract's of the same graph.
+//! The evaluation by rows compared with tract's evaluation of the same graph.
 
 use super::trial::{DIFFERENCE_MAX, difference};
 use super::*;

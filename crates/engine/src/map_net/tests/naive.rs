@@ -1,4 +1,5 @@
-//! Networks of shapes that none shipped has, against sums written down as the trainer defines them.
+//! Networks with shapes that no shipped network has, compared with sums written as the trainer
+//! defines them.
 
 use super::super::net::{Net, Work, Workspace};
 use super::super::parts::{CorrectionParts, LevelParts, Parts};

@@ -1,5 +1,5 @@
-//! Work that may never end, such as reading from a drive that does not answer: on a thread of its
-//! own, which it may keep.
+//! Runs work that may never end, such as reading from a drive that does not answer. It gets a
+//! thread of its own, which is given up if it takes too long.
 
 use std::{
     io,

@@ -1,4 +1,4 @@
-//! Reading a folder of models that may hold anything: within a time and a size.
+//! Reads a folder of models, whatever it holds, within limits of time and size.
 
 use std::{
     borrow::Cow,

@@ -1,4 +1,5 @@
-//! Files the service is made of: embedded in the binary, or read from a folder.
+//! The files of the service: models, atlas, contact model. They are embedded in the binary, or read
+//! from a folder.
 
 mod detached;
 mod folder;

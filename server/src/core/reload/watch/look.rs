@@ -1,5 +1,4 @@
-//! What a folder of models, or of fingers, looks like from outside: whether it has changed, without
-//! reading it.
+//! Whether a folder of models, or of fingers, has changed, as its entries show without being read.
 
 use std::{
     fs::{self, Metadata},

@@ -1,12 +1,13 @@
-//! The bounded queue of slots that wait for a thread: turns are shared by account.
+//! The bounded queue of slots that wait for a thread. Sessions take turns, by their accounts.
 //!
-//! Start-time fair queuing (Goyal, Vin & Cheng 1996): each account has a time on a virtual clock at
-//! which its next turn is due, and every frame moves that on by the thread time that it cost. So
-//! whoever has cost least goes first, ten fingers have the share of one session, and a turn costs
-//! the logarithm of the number of accounts.
+//! Start-time fair queuing (Goyal, Vin & Cheng 1996): a virtual clock gives each account the time
+//! of its next turn, and every frame moves this time on by the thread time that the frame took. So
+//! the session that has cost least goes first, ten fingers of one session share what one session
+//! gets, and the choice takes the logarithm of the number of accounts.
 //!
-//! A turn cannot be taken back once a frame is begun. Therefore heavy accounts ([`Weight`]) hold all
-//! threads but one while light ones are about: whatever their number, a light frame finds a thread.
+//! A turn cannot be taken back once a frame is begun. Therefore heavy accounts ([`Weight`]) may
+//! hold all threads but one as long as light accounts send frames. However many heavy ones there
+//! are, a light frame finds a thread.
 
 use std::{
     cmp::Ordering,

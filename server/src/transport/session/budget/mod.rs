@@ -1,4 +1,4 @@
-//! The budget of a session, kept live: the tier follows what this machine does now.
+//! Keeps the budget of a session: changes its tier as the times on this machine change.
 
 use std::{
     sync::atomic::{AtomicU32, AtomicUsize, Ordering},
