@@ -28,6 +28,8 @@ pub(crate) struct Recipe<'a> {
     /// Whether they may be another finger's: fingers of the same template have the same vertices at
     /// the same (u, v), so that pressure there can be put on this one.
     pub of_any_finger: bool,
+    /// Hash of the file that describes it; empty: there is none.
+    pub finger_file_sha256: String,
     /// Load modes of the second order.
     pub modes: usize,
     /// Displacements of the second order.
@@ -109,6 +111,7 @@ pub(crate) fn make(
         share_max: second.share_max as f32,
         depth_max_mm,
         finger_sha256: recipe.finger.sha256(),
+        finger_file_sha256: recipe.finger_file_sha256.clone(),
         layers: layers_below_pad(shape, tissue)?,
         ..Header::current()
     };

@@ -3,6 +3,7 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
+use papilla_contact::{Arrays, Header, finger_file_sha256};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::geometry::fingertip::offset::at_uv;
 use papilla_fingertip::scene::Finger;
@@ -101,6 +102,48 @@ fn a_new_finger_is_written_once_explained_and_found_by_name() {
         let e = refused(folder.path(), command);
         assert!(e.contains("shape.width_mm = 60.0") && e.contains("7 to 32 mm"), "{e}");
     }
+}
+
+/// A contact model of four vertices that was made of a description with this hash.
+fn contact_model(finger_file_sha256: &str) -> Vec<u8> {
+    let positions_mm = vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0];
+    let normals = [0.0, 0.0, -1.0].repeat(4);
+    let triangles = vec![0, 2, 1, 1, 2, 3];
+    let arrays = Arrays::half_space(positions_mm, normals, vec![0.25; 4], triangles, 0.2);
+    let finger_file_sha256 = finger_file_sha256.to_owned();
+    let header = Header {
+        vertices: 4,
+        triangles: 2,
+        share_max: 1.0,
+        finger_file_sha256,
+        ..Header::current()
+    };
+    arrays.to_bytes(&header).unwrap()
+}
+
+#[test]
+fn explain_says_that_a_contact_model_is_of_other_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    done(folder.path(), &["finger", "new", "--out", "mine"]);
+    let file = folder.path().join("mine/finger.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let contact = folder.path().join("mine/finger.contact");
+    let explained = || {
+        let said = done(folder.path(), &["finger", "explain", "mine", "--json"]);
+        serde_json::from_str::<Value>(&said).unwrap()["contact_is_current"].clone()
+    };
+    assert_eq!(explained(), Value::Null);
+    std::fs::write(&contact, contact_model("")).unwrap();
+    assert_eq!(explained(), Value::Null);
+    let sha256 = finger_file_sha256(&text, |_| None).unwrap();
+    std::fs::write(&contact, contact_model(&sha256)).unwrap();
+    assert_eq!(explained(), true);
+    std::fs::write(&file, format!("# the same\n{text}")).unwrap();
+    assert_eq!(explained(), true);
+    std::fs::write(&file, text.replace("width_mm = 17.44", "width_mm = 18")).unwrap();
+    assert_eq!(explained(), false);
+    let said = done(folder.path(), &["finger", "explain", "mine"]);
+    assert!(said.contains("finger.contact is out of date"), "{said}");
 }
 
 #[test]

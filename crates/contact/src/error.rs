@@ -50,6 +50,12 @@ pub enum ModelError {
         /// What it has to be.
         rule: &'static str,
     },
+    /// The model is of another finger, though maybe of the same atlas: bone and tissues do not show there.
+    #[error(
+        "the contact model was made of another finger.toml, or skin, than the one beside it; make it \
+         anew with `fe-datagen finger build`"
+    )]
+    Finger,
     /// The model is of another atlas.
     #[error("the contact model is of atlas {found}, the session's atlas is {expected}")]
     Atlas {

@@ -47,6 +47,10 @@ pub struct Header {
     /// not known. Bone and tissues do not show in the atlas.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub finger_sha256: String,
+    /// Hash of the file that described the finger ([`crate::finger_file_sha256`]); empty: not known. Whoever
+    /// has the file but no meshes can tell by it whether the model is of that file.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub finger_file_sha256: String,
     /// Layers below the middle of the pad, from the surface down to the bone; none: pixels cannot be
     /// solved.
     #[serde(default)]
@@ -196,6 +200,16 @@ impl ContactModel {
     pub(crate) fn end_mm(&self, direction: [f64; 3]) -> f64 {
         let along = |i: usize| self.ends_mm[i].map(|end| end * direction[i]);
         (0..3).map(|i| along(i)[0].max(along(i)[1])).sum()
+    }
+
+    /// Refuses a model that was made of another description of the finger than the one with this
+    /// [hash](crate::finger_file_sha256). A model that does not know its description is accepted.
+    ///
+    /// # Errors
+    /// [`ModelError::Finger`].
+    pub fn require_finger_file(&self, sha256: &str) -> Result<(), ModelError> {
+        let own = &self.header.finger_file_sha256;
+        if own.is_empty() || own == sha256 { Ok(()) } else { Err(ModelError::Finger) }
     }
 
     /// Refuses a model of another atlas.

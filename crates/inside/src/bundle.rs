@@ -1,11 +1,12 @@
 //! The folder of one finger: its atlas, and what finds contact.
 
 use std::{
+    fs,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
+use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin, finger_file_sha256};
 use papilla_proto::{
     atlas::{Atlas, Patch, Raster},
     contact::ContactErrors,
@@ -113,12 +114,32 @@ struct ReadContact {
     contact_sha256: Option<String>,
 }
 
+/// Refuses a contact model of a folder's finger that was described otherwise when it was made. A model
+/// of another name is not that folder's.
+fn require_finger(model: &ContactModel, file: &Path) -> Result<(), LoadError> {
+    let described = file.with_file_name("finger.toml");
+    if model.header().finger_file_sha256.is_empty()
+        || file.file_name().is_none_or(|name| name != CONTACT)
+        || !described.exists()
+    {
+        return Ok(());
+    }
+    let (described, text) = read_text(described)?;
+    let skin = |name: &str| fs::read(file.with_file_name(Path::new(name).file_name()?)).ok();
+    let sha256 = finger_file_sha256(&text, skin)
+        .map_err(|source| LoadError::Finger { file: described, source })?;
+    model
+        .require_finger_file(&sha256)
+        .map_err(|source| LoadError::Contact { file: file.to_owned(), source })
+}
+
 fn read_contact(file: PathBuf, atlas: &Atlas) -> Result<ReadContact, LoadError> {
     let (file, bytes) = read(file)?;
     let beside = file.with_file_name("contact.json");
     let model = ContactModel::read(&bytes)
         .and_then(|model| model.require_atlas(atlas.hash()).map(|()| model))
-        .map_err(|source| LoadError::Contact { file, source })?;
+        .map_err(|source| LoadError::Contact { file: file.clone(), source })?;
+    require_finger(&model, &file)?;
     let sha256 = model_sha256(&bytes);
     let contact_errors = if beside.exists() {
         let (file, json) = read(beside)?;

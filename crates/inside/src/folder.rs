@@ -55,6 +55,14 @@ pub enum LoadError {
         /// Why.
         source: papilla_contact::ModelError,
     },
+    /// The description of the finger is no TOML.
+    #[error("{}: {source}", .file.display())]
+    Finger {
+        /// Which.
+        file: PathBuf,
+        /// Why.
+        source: papilla_contact::FingerFileError,
+    },
     /// What the contact model's methods err cannot be read.
     #[error("{}: {source}", .file.display())]
     Errors {

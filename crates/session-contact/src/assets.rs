@@ -6,8 +6,8 @@ use std::{
 };
 
 use papilla_contact::{
-    Contact, ContactModel, InterfaceSkin, Method, ModelError, Object, PixelContact, PixelSkin,
-    Settings, ShearEnergy, Solver,
+    Contact, ContactModel, FingerFileError, InterfaceSkin, Method, ModelError, Object,
+    PixelContact, PixelSkin, Settings, ShearEnergy, Solver, finger_file_sha256,
 };
 use papilla_proto::{
     MAP_LEN,
@@ -54,6 +54,9 @@ pub enum AssetsError {
     /// The model is no good.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The finger's description beside it cannot be read.
+    #[error("finger.toml beside it: {0}")]
+    Finger(#[from] FingerFileError),
     /// What methods err with it cannot be read.
     #[error(
         "contact.json beside it: {0}; make it again with `model-export contact --write`, or take it away"
@@ -81,6 +84,23 @@ impl ContactAssets {
         let sha256 = model_sha256(bytes);
         let errors = errors.map(|json| contact_errors(json, &sha256)).transpose()?.flatten();
         Ok(Self { model, pixels, interface, times: OnceLock::new(), errors, sha256 })
+    }
+
+    /// Refuses a contact model that was made of another description of the finger than the text of the
+    /// `finger.toml` beside it. `skin` is given the name of a file of that folder and returns its bytes,
+    /// if it is there. A contact model that does not know its description is accepted.
+    ///
+    /// # Errors
+    /// [`AssetsError::Model`]; [`AssetsError::Finger`] if the text cannot be read.
+    pub fn require_finger_file(
+        &self,
+        text: &str,
+        skin: impl FnOnce(&str) -> Option<Vec<u8>>,
+    ) -> Result<(), AssetsError> {
+        if self.model.header().finger_file_sha256.is_empty() {
+            return Ok(());
+        }
+        Ok(self.model.require_finger_file(&finger_file_sha256(text, skin)?)?)
     }
 
     /// Measures on this thread what every method takes; until then times are expected, not known.

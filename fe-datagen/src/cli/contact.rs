@@ -39,6 +39,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         finger: &finger,
         datasets: &args.datasets,
         of_any_finger: false,
+        finger_file_sha256: String::new(),
         modes: args.modes,
         outputs: args.outputs,
     };

@@ -198,6 +198,11 @@ pub(crate) fn load_contact(
         None => assets.get(CONTACT_ERRORS).map(Cow::Borrowed),
     };
     let contact = ContactAssets::read(&bytes, beside.as_deref(), &catalogue.atlas, &catalogue.skin);
+    let contact = contact.and_then(|contact| match &config.contact {
+        // Whoever names a file may keep it elsewhere than what it was made of.
+        Some(_) => Ok(contact),
+        None => assets.require_finger_of(&contact).map(|()| contact),
+    });
     contact.map(Some).map_err(|error| bad(error.to_string()))
 }
 

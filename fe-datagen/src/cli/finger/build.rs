@@ -3,11 +3,13 @@
 use crate::cli::contact;
 use crate::contact_model::{MODES, OUTPUTS, Recipe};
 use anyhow::Context as _;
+use papilla_contact::finger_file_sha256;
 use papilla_fingertip::mesh::fingertip::{Density, check_elements};
 use papilla_fingertip::scene::Finger;
+use papilla_fingertip::scene::finger::FINGER_FILE;
 use papilla_fingertip::simulation::body::Body;
 use papilla_output::atomic;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Write a finger's atlas.json and finger.contact into its folder.
@@ -35,6 +37,14 @@ pub(super) struct Args {
     atlas_only: bool,
 }
 
+/// Hash of the file that describes the finger of a folder.
+pub(super) fn described(folder: &Path) -> anyhow::Result<String> {
+    let path = folder.join(FINGER_FILE);
+    let text = papilla_json::read_text(&path).with_context(|| path.display().to_string())?;
+    let skin = |name: &str| std::fs::read(folder.join(name)).ok();
+    finger_file_sha256(&text, skin).with_context(|| path.display().to_string())
+}
+
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let folder = &args.finger;
     anyhow::ensure!(folder.is_dir(), "{} is not the folder of a finger", folder.display());
@@ -51,6 +61,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             finger: &finger,
             datasets: &args.presses,
             of_any_finger: true,
+            finger_file_sha256: described(folder)?,
             modes: args.modes,
             outputs: args.outputs,
         };

@@ -1,6 +1,9 @@
 //! `finger explain`: shows the numbers of a finger's file, and whether it can be meshed.
 
+use super::build::described;
 use crate::cli::print;
+use anyhow::Context as _;
+use papilla_contact::ContactModel;
 use papilla_fingertip::geometry::fingertip::SCALED_JACOBIAN_MIN;
 use papilla_fingertip::geometry::fingertip::SurfaceParameter;
 use papilla_fingertip::mesh::fingertip::check_elements;
@@ -8,7 +11,7 @@ use papilla_fingertip::scene::Finger;
 use papilla_fingertip::scene::finger::{FIELDS, Source};
 use papilla_fingertip::tissue::Tissue;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Say what a finger is: every number with unit, default and range, what lies between skin and
@@ -58,6 +61,24 @@ struct Explanation {
     below_pad_mm: [f64; 3],
     /// Least scaled Jacobian of the soft tissue.
     scaled_jacobian_min: f64,
+    /// Whether the contact model beside the file was made of it; absent without one that tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    contact_is_current: Option<bool>,
+}
+
+/// Whether the contact model in a finger's folder was made of the description there; none if there is
+/// no model, or one that does not tell.
+fn contact_is_current(folder: &Path) -> anyhow::Result<Option<bool>> {
+    let path = folder.join("finger.contact");
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
+    let model = ContactModel::read(&bytes).with_context(|| path.display().to_string())?;
+    if model.header().finger_file_sha256.is_empty() {
+        return Ok(None);
+    }
+    Ok(Some(model.require_finger_file(&described(folder)?).is_ok()))
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
@@ -84,6 +105,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             poissons_ratio: spec.poissons_ratio,
         }
     };
+    let above = args.finger.parent().unwrap_or(Path::new(""));
+    let folder = if args.finger.is_dir() { &args.finger } else { above };
     let explanation = Explanation {
         file: args.finger.clone(),
         sha256: finger.sha256(),
@@ -92,6 +115,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         tissues: Tissue::ALL.iter().map(elastic).collect(),
         below_pad_mm,
         scaled_jacobian_min: check_elements(shape)?,
+        contact_is_current: contact_is_current(folder)?,
         source: finger.source.clone(),
     };
     print(&explanation, args.json, || human(&explanation))?;
@@ -124,9 +148,17 @@ fn human(e: &Explanation) -> String {
         text += &format!("{:16} {:19} {:17}\n", t.tissue, t.youngs_modulus_mpa, t.poissons_ratio);
     }
     let [epidermis, dermis, fat] = e.below_pad_mm;
+    let contact = match e.contact_is_current {
+        None => "",
+        Some(true) => "\nfinger.contact was made of these numbers",
+        Some(false) => {
+            "\nfinger.contact is out of date: it was made of other numbers, or another skin; make it \
+             anew with `fe-datagen finger build`"
+        }
+    };
     text + &format!(
         "\nbelow the middle of the pad: epidermis {epidermis:.2}, dermis {dermis:.2}, fat {fat:.2} mm, then \
-         bone\nelements: least scaled Jacobian {:.3} ({SCALED_JACOBIAN_MIN} is asked for)\nsha256 {}",
+         bone\nelements: least scaled Jacobian {:.3} ({SCALED_JACOBIAN_MIN} is asked for)\nsha256 {}{contact}",
         e.scaled_jacobian_min, e.sha256
     )
 }

@@ -72,7 +72,8 @@ impl Bundle {
         let contact = match assets.get(CONTACT) {
             Some(bytes) => {
                 let (errors, skin) = (assets.get(CONTACT_ERRORS), &catalogue.skin);
-                let contact = ContactAssets::read(bytes, errors, &catalogue.atlas, skin);
+                let contact = ContactAssets::read(bytes, errors, &catalogue.atlas, skin)
+                    .and_then(|contact| assets.require_finger_of(&contact).map(|()| contact));
                 Some(contact.map_err(|error| bad(CONTACT, error.to_string()))?)
             }
             None => None,

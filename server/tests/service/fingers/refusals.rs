@@ -2,12 +2,13 @@
 
 use std::fs;
 
+use papilla_contact::finger_file_sha256;
 use serde_json::{Value, json};
 
 use super::support::{add, folder, index, named, service, service_with, thumb_atlas};
 use crate::support::{
     GAIN, Service, add_model_of_gain,
-    contact::{atlas, atlas_of, ball_hello, deep, model, rows},
+    contact::{atlas, atlas_of, ball_hello, deep, model, model_described, rows},
     hello, papilla, write,
 };
 
@@ -81,6 +82,18 @@ async fn a_folder_that_is_half_written_or_mixed_is_refused_with_what_is_wrong() 
     let bytes = fs::read(&torn).unwrap();
     fs::write(&torn, &bytes[..bytes.len() / 2]).unwrap();
     write(&broken("other-contact"), "finger.contact", &model());
+    // Made of a finger whose tissues, or whose skin, were others.
+    let described = |text: &str| finger_file_sha256(text, |_| Some(b"{}".to_vec())).unwrap();
+    let text = "[shape]\nskin = \"skin.json\"\n[tissue.dermis]\nyoungs_modulus_mpa = 0.1\n";
+    let (other_text, made) = (text.replace("0.1", "0.2"), described(text));
+    for (name, skin, text) in
+        [("as-made", "{}", text), ("other-skin", "[]", text), ("other-tissue", "{}", &other_text)]
+    {
+        let folder = broken(name);
+        write(&folder, "finger.toml", text.as_bytes());
+        write(&folder, "skin.json", skin.as_bytes());
+        write(&folder, "finger.contact", &model_described(&thumb_atlas(), &made));
+    }
     let damaged = broken("damaged-contact").join("finger.contact");
     let bytes = fs::read(&damaged).unwrap();
     fs::write(&damaged, &bytes[..bytes.len() / 2]).unwrap();
@@ -110,6 +123,8 @@ async fn a_folder_that_is_half_written_or_mixed_is_refused_with_what_is_wrong() 
         ("no-net", &["own.onnx"]),
         ("torn", &["own.onnx"]),
         ("other-contact", &["finger.contact", "atlas"]),
+        ("other-skin", &["finger.contact", "finger build"]),
+        ("other-tissue", &["finger.contact", "finger build"]),
         ("damaged-contact", &["finger.contact"]),
         ("other-network", &["own.onnx", atlas().hash(), "\"trained_on\": \"default\""]),
         ("no-lender", &["own.onnx", "'thumb'"]),
@@ -120,6 +135,7 @@ async fn a_folder_that_is_half_written_or_mixed_is_refused_with_what_is_wrong() 
         let said = format!("finger '{name}'");
         assert_says(&error, "fingers[1].name", &[&[said.as_str()], words].concat());
     }
+    service.socket().await.open(hello(&named(&["as-made"]))).await;
     // Whoever mends it is not told the old fault once the models were reloaded.
     fs::copy(fingers.path().join("thumb/finger.toml"), fingers.path().join("no-toml/finger.toml"))
         .unwrap();

@@ -14,7 +14,7 @@ use papilla_engine::card::Index;
 use papilla_proto::json;
 
 use super::{
-    CONTACT, CONTACT_ERRORS, ERROR_LAWS, FINGER, Files,
+    CONTACT, CONTACT_ERRORS, ERROR_LAWS, FINGER, Files, SKIN,
     detached::{STRANDED_MAX, Unfinished, detached},
 };
 use crate::StartError;
@@ -27,7 +27,7 @@ pub(super) const FOLDER_BYTES_MAX: u64 = 1 << 30;
 const WAIT_MAX: Duration = Duration::from_secs(20);
 
 /// The files of every service; an index names the models beside them.
-const BASE: [&str; 8] = [
+const BASE: [&str; 9] = [
     "index.json",
     "atlas.json",
     "replay.json",
@@ -36,6 +36,7 @@ const BASE: [&str; 8] = [
     CONTACT_ERRORS,
     ERROR_LAWS,
     FINGER,
+    SKIN,
 ];
 
 /// What there is in a folder.

@@ -9,6 +9,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use papilla_session_contact::{AssetsError, ContactAssets};
+
 use crate::{StartError, config::Config};
 
 /// The contact model's file among the others.
@@ -17,6 +19,8 @@ pub(crate) const CONTACT: &str = "finger.contact";
 pub(crate) const FINGER: &str = "finger.toml";
 /// Most bytes of all files of a finger's folder that are read.
 pub(crate) const FINGER_FILES_BYTES_MAX: u64 = 256 << 20;
+/// The offset of its skin from the template, if it has one.
+pub(crate) const SKIN: &str = "skin.json";
 /// What methods err with it.
 pub(crate) const CONTACT_ERRORS: &str = "contact.json";
 
@@ -161,6 +165,18 @@ impl Assets {
             return Ok(Cow::Owned(bytes));
         }
         self.require(name).map(Cow::Borrowed)
+    }
+
+    /// Refuses a contact model that was made before the finger's description in this folder was changed:
+    /// its atlas may be the same, since bone and tissues do not show there. Without a description there
+    /// is nothing to compare with.
+    ///
+    /// # Errors
+    /// [`AssetsError`].
+    pub(crate) fn require_finger_of(&self, contact: &ContactAssets) -> Result<(), AssetsError> {
+        let Some(text) = self.get(FINGER) else { return Ok(()) };
+        let skin = |name: &str| self.get(name).map(<[u8]>::to_vec);
+        contact.require_finger_file(&String::from_utf8_lossy(text), skin)
     }
 
     /// The bytes of the file called `name`.
