@@ -44,6 +44,7 @@ def _rendered(
     progress: Progress,
     hello: dict[str, Any],
 ) -> Iterator[Series]:
+    hello = {"error_estimate": True, **hello}
     with Session(url, token, **hello) as first:
         source = Source(frames, times, unit, Terms.of(hello, first.ready))
         if lanes is None:
@@ -77,7 +78,8 @@ def render(
     rates have no part of motion, and relaxation and spikes are refused. `unit` is that of `frames`.
 
     Frames of pressure that do not depend on those before go over several connections at once (`lanes`);
-    all others go over one, in order, one at a time. The rest are members of the hello, as for `Session`.
+    all others go over one, in order, one at a time. The rest are members of the hello, as for `Session`;
+    answers say how wrong they are likely to be, unless it is `error_estimate=False`.
 
     Raises BadInput before anything is sent, and FrameFailed for a frame without an answer.
     """

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import save
-from .answer import Answer, Summary, Touch
+from .answer import NOT_STATED, Answer, ErrorEstimate, Summary, Touch
 from .errors import NotCarried
 from .spikes import SpikeTrains
 from .wire import FLAGS, SIDE_PX
@@ -30,7 +30,9 @@ class Series:
     `values` has an array for each quantity, with the frame as first axis. What there is depends on the hello:
     `sed_j_per_m3`, `rates_hz`, `pressure_pa`, `shear_pa`, `displacement_mm`, `points_j_per_m3`,
     `point_rates_hz`, `actuators`, the members of `Touch` and `Summary` as `touch_force_n`, `summary_sa1_rate_hz` and
-    so on, and times in the service. `series["sed_j_per_m3"]` is the same as `series.values["sed_j_per_m3"]`.
+    so on, how wrong each answer is likely to be (the members of `ErrorEstimate`, as `error_sed_p90`; infinite where
+    nothing is stated), and times in the service. `series["sed_j_per_m3"]` is the same as
+    `series.values["sed_j_per_m3"]`.
     """
 
     def __init__(
@@ -180,6 +182,9 @@ def _quantities(answer: Answer) -> dict[str, Any]:
     if answer.summary is not None:
         for name in Summary._fields:
             found[f"summary_{name}"] = np.float64(getattr(answer.summary, name))
+    if answer.error_estimate is not NOT_STATED:
+        for name in ErrorEstimate._fields:
+            found[f"error_{name}"] = np.float64(getattr(answer.error_estimate, name))
     for name in ("total_us", "queue_us", "infer_us"):
         found[name] = np.int64(getattr(answer, name))
     return found

@@ -36,6 +36,19 @@ def test_every_frame_of_a_series_is_answered_as_if_it_were_alone(url, lanes):
     assert set(series.tier) == {"nano"} and series.flagged() == 0
 
 
+def test_a_series_says_how_wrong_each_answer_may_be(url):
+    path = poses()
+    series = papilla.render(path, url=url, input="objects", objects=[BALL])
+    with papilla.Session(url, input="objects", objects=[BALL], error_estimate=True) as session:
+        one_by_one = [session.touch(pose[None]).error_estimate for pose in path]
+    stated = np.stack([series[f"error_{name}"] for name in papilla.ErrorEstimate._fields], axis=1)
+    np.testing.assert_allclose(stated[1:], one_by_one[1:], rtol=1e-3)
+    assert np.isfinite(stated[1:]).all() and (stated[1:, 0] < stated[1:, 1]).all()
+    assert np.isinf(stated[0]).all()  # nothing touches
+    without = papilla.render(path, url=url, input="objects", objects=[BALL], error_estimate=False)
+    assert "error_sed_p90" not in without.values
+
+
 def test_a_series_remembers_in_the_order_of_its_frames(url):
     held = np.repeat(bump()[None], 10, axis=0)
     times_s = 0.05 * np.arange(10)
