@@ -10,58 +10,60 @@ use papilla_session_effects::Effects;
 
 use crate::{Maps, SkinPixels};
 
-/// What a frame is judged by: the skin, and what the network's training had at most.
+/// What a frame is compared with: the skin, and the greatest values in the training of the network.
 #[derive(Debug, Clone, Copy)]
 pub struct Known<'a> {
     /// The skin of the atlas.
     pub skin: &'a SkinPixels,
-    /// Of pressure; none: the network was fitted to no maps.
+    /// Greatest statistics of the pressure maps; none if the network was not trained on maps.
     pub input_max: Option<InputStatistics>,
-    /// Of SED over squared pressure, 1/MPa; none likewise.
+    /// Greatest SED over squared pressure, 1/MPa; none if the network was not trained on maps.
     pub response_max_per_mpa: Option<f32>,
-    /// By what the errors of answers are told; none: they are not.
+    /// The laws by which errors of answers are estimated; none if there are no estimates.
     pub errors: Option<KnownErrors<'a>>,
 }
 
-/// The laws of errors, and which of them are the network's.
+/// The laws of errors, and which of them belong to the network.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownErrors<'a> {
-    /// All of them.
+    /// The laws of all networks and methods.
     pub laws: &'a ErrorLaws,
-    /// SHA-256 of the network's file; none: it knows another finger, and nothing is told of its SED.
+    /// SHA-256 of the network's file; none if the network belongs to another finger, for whose SED
+    /// no error is estimated.
     pub onnx_sha256: Option<&'a str>,
 }
 
-/// Where the pressure of a frame is from.
+/// Where the pressure of a frame comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Source {
     /// The client sent it as a map.
     Map,
-    /// Contact found it of rigid objects without friction, and settled within its range.
+    /// The contact solver found it, for rigid objects without friction; it converged and was within
+    /// its range.
     Contact(Felt),
-    /// Any other way: nothing was calibrated of it.
+    /// Any other way, for which no errors were calibrated.
     Other,
 }
 
-/// A frame as it was read: its pressure lies in [`Maps`].
+/// A frame that was read; its pressure is in [`Maps`].
 #[derive(Debug, Clone, Copy)]
 pub struct Read {
-    /// Of the pressure.
+    /// Summary of the pressure.
     pub summary: MapSummary,
-    /// What is taken of pressure.
+    /// The range of pressure, and what happens beyond it.
     pub range: PressureRange,
     /// The client's clock, microseconds.
     pub time_us: u64,
-    /// The client knows where things are.
+    /// Whether the client knows where things are.
     pub is_tracked: bool,
-    /// SED is to be found; without it poses go in and forces come out.
+    /// Whether SED is computed; if not, only forces are.
     pub shows_sed: bool,
-    /// Where the pressure is from.
+    /// Where the pressure comes from.
     pub source: Source,
 }
 
-/// A frame on its way to SED: [`begin`](Self::begin); [`infer`](Self::infer) if it
-/// [touches](Self::touches); [`end`](Self::end). Between them whoever renders looks at clocks and
+/// A frame on its way to SED: call [`begin`](Self::begin), then [`infer`](Self::infer) if it
+/// [touches](Self::touches), and [`end`](Self::end). Between them the caller looks at clocks and
 /// deadlines. Nothing here allocates.
 #[derive(Debug)]
 pub struct Rendering<'a> {
@@ -72,14 +74,15 @@ pub struct Rendering<'a> {
     read: Read,
     touches: bool,
     flags: u8,
-    /// Greatest SED and its sum, once there is an answer.
+    /// The greatest SED and the sum of SED, once the network has answered.
     sed: Option<PeakAndSum>,
-    /// Whether an effect changes the tissue, which no law knows.
+    /// Whether an effect changes the tissue; no law of errors was calibrated for that.
     is_changed: bool,
 }
 
 impl<'a> Rendering<'a> {
-    /// Lets the effects that come before the network change the pressure, and judges it.
+    /// Lets the effects that come before the network change the pressure, and compares the result with
+    /// the training.
     pub fn begin(
         maps: &'a mut Maps,
         finger: Option<&'a mut Finger>,
@@ -104,7 +107,7 @@ impl<'a> Rendering<'a> {
         Self { maps, finger, effects, known, read, touches, flags, sed: None, is_changed }
     }
 
-    /// Whether the network is to be asked: SED is to be shown, and something presses.
+    /// Whether the network is to run: SED is wanted, and something presses.
     #[must_use]
     pub fn touches(&self) -> bool {
         self.touches
@@ -122,7 +125,7 @@ impl<'a> Rendering<'a> {
         self.read.time_us
     }
 
-    /// Asks the network, and judges its answer.
+    /// Runs the network, and compares its answer with the training.
     ///
     /// # Errors
     /// As [`Session::infer`].
@@ -134,8 +137,8 @@ impl<'a> Rendering<'a> {
         Ok(())
     }
 
-    /// What the answer of the network shows of its error; unknown before there is one, and of a
-    /// network whose training is not known.
+    /// The facts of the answer by which its error is estimated. They are unknown before there is an
+    /// answer, and for a network whose training is not known.
     #[must_use]
     pub fn facts(&self) -> Facts {
         let Some((sed, trained)) = self.sed.zip(self.known.input_max) else {
@@ -144,8 +147,7 @@ impl<'a> Rendering<'a> {
         self.maps.facts(sed, trained)
     }
 
-    /// How wrong the answer is likely to be, by what it shows. To be asked before
-    /// [`end`](Self::end).
+    /// How wrong the answer is likely to be. To be called before [`end`](Self::end).
     #[must_use]
     pub fn error_estimate(&self) -> ErrorEstimate {
         let Some(KnownErrors { laws, onnx_sha256 }) = self.known.errors else {
@@ -172,8 +174,8 @@ impl<'a> Rendering<'a> {
         ErrorEstimate { sed, force }
     }
 
-    /// Adds what traction along the skin changes, fits the drive of actuators, which may ask the
-    /// network again, and turns all of it into this person's.
+    /// Adds the part of SED that traction along the skin makes, fits the drive of actuators, which may
+    /// run the network again, and scales all of it to this person's finger.
     ///
     /// # Errors
     /// As [`Session::infer`].
@@ -199,21 +201,20 @@ impl<'a> Rendering<'a> {
     }
 }
 
-/// Where the pressure is from of a frame that is no window.
+/// Where the pressure comes from in a frame that is not a map of pressure.
 #[must_use]
 pub fn source_of(taken: &Taken) -> Source {
     taken.felt.map_or(Source::Other, Source::Contact)
 }
 
-/// What a force that contact found shows of its error.
+/// The facts of a contact by which the error of its force is estimated.
 #[must_use]
 pub fn facts_of_force(felt: Felt) -> Facts {
     Facts::of_force(felt.force_n, felt.centre_mm)
 }
 
-/// Takes a frame of a client that does not know where things are, or what presses: nothing is shown,
-/// and what finger and effects remember waits for the next frame. Returns what is read of it, and
-/// its flags.
+/// Takes a frame of a client that does not know where things are. All values are zero, and what finger
+/// and effects remember is kept for the next frame. Returns the frame as read, and its flags.
 pub fn lose(
     maps: &mut Maps,
     finger: Option<&mut Finger>,

@@ -45,14 +45,14 @@ use papilla_session_contact::{Finger, Frame, Taken};
 pub use frame::{Known, KnownErrors, Read, Rendering, Source, facts_of_force, lose, source_of};
 pub use skin::SkinPixels;
 
-/// Room above the greatest response of the training, as a factor: about what networks err by at worst
-/// where they know the pressure.
+/// Factor above the greatest response of the training beyond which a map is flagged: about the worst
+/// error of networks on pressure like that of the training.
 const RESPONSE_HEADROOM: f32 = 1.5;
 
-/// The last look at what a [finger wrote](Finger::write): every number that is sent is finite.
+/// The last check of what a [finger wrote](Finger::write): every number that is sent is finite.
 ///
 /// # Errors
-/// One is not: a fault of the solver, which no client has to read as an answer.
+/// A number is not finite. This is a fault of the solver, which no client should get as an answer.
 pub fn require_finite(written: &[u8]) -> Result<(), Problem> {
     match first_not_finite_in(written) {
         None => Ok(()),
@@ -71,12 +71,12 @@ pub struct Maps {
     pub pressure_pa: Vec<f32>,
     /// 224 x 224, J/m3.
     pub sed_j_per_m3: Vec<f32>,
-    /// What the network sees in place of pressure beyond its range.
+    /// The pressure that the network gets in place of one beyond its range.
     clamped_pa: Vec<f32>,
     is_clamped: bool,
     /// Greatest pressure that the network sees, Pa.
     seen_peak_pa: f32,
-    /// What was seen of that pressure, if the training is known.
+    /// The statistics of that pressure, if the training is known.
     look: Look,
 }
 
@@ -98,7 +98,7 @@ impl Default for Maps {
 }
 
 impl Maps {
-    /// Checks the pressure, and takes off what lies off the skin.
+    /// Checks the pressure, and sets it to zero on pixels without skin.
     ///
     /// # Errors
     /// The first sample at fault.
@@ -111,7 +111,7 @@ impl Maps {
         Ok(keep_inside(&mut self.pressure_pa, &skin.mask))
     }
 
-    /// The same of a finger whose pressure was sent as a map, which becomes that of reference
+    /// The same for a finger whose pressure was sent as a map; the map is scaled to the reference
     /// stiffness.
     ///
     /// # Errors
@@ -149,7 +149,7 @@ impl Maps {
         Ok(taken)
     }
 
-    /// Judges the pressure by what the network was trained on, and clamps it if `range` says so.
+    /// Compares the pressure with that of the training, and limits it if `range` says so.
     pub(crate) fn judge(
         &mut self,
         summary: MapSummary,
@@ -180,7 +180,7 @@ impl Maps {
         Judged { flags, is_zero }
     }
 
-    /// Asks the network for SED under the pressure as [`judge`](Self::judge) left it.
+    /// Runs the network on the pressure as [`judge`](Self::judge) left it.
     ///
     /// # Errors
     /// As [`Session::infer`].
@@ -208,18 +208,18 @@ impl Maps {
         PeakAndSum::of(&self.sed_j_per_m3)
     }
 
-    /// What pressure and answer show of the answer's error.
+    /// The facts of pressure and answer by which the error of the answer is estimated.
     pub(crate) fn facts(&self, sed: PeakAndSum, trained: InputStatistics) -> Facts {
         Facts::of_sed(&self.look, self.seen_peak_pa, sed.sum, trained.cells)
     }
 
-    /// Adds to SED what traction along the skin changes, if the finger is to feel it.
+    /// Adds the part of SED that traction along the skin makes, if the session asks for it.
     pub(crate) fn feel_shear(&mut self, finger: &mut Finger, range: PressureRange) {
         let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
         finger.feel_shear(seen_pa, range, &mut self.sed_j_per_m3);
     }
 
-    /// Turns pressure and SED of the finger of reference stiffness into this person's.
+    /// Scales pressure and SED from the finger of reference stiffness to this person's.
     pub(crate) fn turn_to_person(&mut self, finger: &Finger) {
         finger.to_person(&mut self.pressure_pa);
         finger.to_person(&mut self.sed_j_per_m3);

@@ -16,11 +16,11 @@ use serde::Serialize;
 
 use super::replay::Replay;
 
-/// A state may err by so many times the 95th percentile of the card's test states: rare ones do,
-/// while a wrong scale or orientation errs by about 1.
+/// The error of a state may be this many times the 95th percentile on the card. Rare states come near
+/// it; with a wrong scale or orientation the error is about 1.
 const TIMES_P95: f64 = 3.0;
 
-/// And by so much in any case, so that a nearly exact model is not held to its rounding.
+/// An error that is always allowed, so that a nearly exact model is not refused for its rounding.
 const ERROR_MIN: f64 = 0.05;
 
 /// Least share of the FE solver's map in an answer, whatever error the card allows. A model of
@@ -41,7 +41,7 @@ pub(crate) struct Golden {
     pub(crate) relative_l2: f64,
     /// The error it may have.
     pub(crate) relative_l2_max: f64,
-    /// Least share of the due map in an answer: `sum found due / sum due^2`.
+    /// Least share of the true map in an answer: `sum found true / sum true^2`.
     pub(crate) share: f64,
 }
 

@@ -8,8 +8,8 @@ use std::{
 use papilla_engine::Model;
 use papilla_proto::Problem;
 
-/// For so long after a failure nobody has a model, or a finger, loaded again: whoever names it hears
-/// the same.
+/// Time after a failure in which a model, or a finger, is not loaded again. Whoever names it in that
+/// time gets the same error.
 pub(crate) const RETRY_AFTER: Duration = Duration::from_secs(10);
 
 /// A model, once it is loaded.

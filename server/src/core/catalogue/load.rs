@@ -108,7 +108,7 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
     Some(set.to_owned())
 }
 
-/// By so much a shipped time may be greater and still not count as slower.
+/// Factor by which a shipped time may be greater without counting as slower.
 const MARGIN: f64 = 1.1;
 
 fn milliseconds(ms: f64) -> Duration {

@@ -7,23 +7,24 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Work beside the network from which a frame is long. The network's own time is the operator's
-/// choice of models; all else depends on what a client sends.
+/// A frame is *long* if it takes more thread time than this beside its network. The time of the
+/// network depends on the models that the operator offers, all else on what a client sends.
 pub(super) const LONG: Duration = Duration::from_millis(10);
 
-/// So much longer a single frame makes its account heavy by itself; a cold press on pixels does not.
+/// A single frame that takes this many times [`LONG`] makes its account heavy. The first frame of a
+/// contact on pixels takes less.
 const ALONE: u32 = 3;
 
-/// Frames over which work is averaged: an account is heavy whose frames are long on the average.
+/// Number of frames of the moving average: if it is long, the account is heavy.
 const AVERAGED: u32 = 8;
 
 /// How long an account with long frames stays heavy.
 const HEAVY_FOR: Duration = Duration::from_secs(10);
 
-/// Greatest debt that an account takes along when it comes back after a pause.
+/// Greatest debt that an account keeps when it comes back after a pause.
 const DEBT_MAX: Duration = Duration::from_secs(1);
 
-/// What a frame is taken to cost until one has been measured.
+/// Cost that is assumed for a frame until one has been measured.
 const FIRST_ESTIMATE: Duration = Duration::from_millis(1);
 
 /// The account that all fingers of a session share, or all posts of one client; `S` is what waits.
