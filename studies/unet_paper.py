@@ -315,7 +315,7 @@ def kernel_table(whole):
         medians, ends = (np.array([100 * np.percentile(each, at) for each in errors]) for at in (50, 95))
         means.append(medians.mean())
         rows.append((f"by {split}", len(errors), percent(errors[0]), spanned(medians), spanned(ends)))
-    rows.append(("smaller by sample by", "", "", f"{100 * (1 - means[1] / means[0]):.0f} %", ""))
+    rows.append(("the error by sample is smaller by", "", "", f"{100 * (1 - means[1] / means[0]):.0f} %", ""))
     return table(
         ("split", "draws", "relative L2, first draw", "median, of all draws", "95th percentile, of all draws"), *rows
     )
