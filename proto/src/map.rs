@@ -1,4 +1,4 @@
-//! The map: 224 x 224 samples, row-major, row 0 at the fingertip's far end.
+//! The map: 224 x 224 samples, row by row, with row 0 at the tip of the finger.
 
 use crate::{ErrorCode, Problem, effects::OutOfRange};
 

@@ -1,4 +1,4 @@
-//! What presses on a finger: the outcome of a frame.
+//! The answer of a contact solve: pressure, force, and how far to trust them.
 
 use crate::PA_PER_MPA;
 use crate::model::ContactModel;

@@ -1,4 +1,5 @@
-//! Balls round neighbouring vertices, so that what is far needs no distance of each vertex.
+//! Balls around neighbouring vertices. If a ball is far from an object, the distances of its
+//! vertices need not be computed.
 
 /// Vertices of a ball at most.
 const LEAF: usize = 12;

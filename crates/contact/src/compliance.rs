@@ -1,4 +1,4 @@
-//! How the vertices of a finger move each other, neighbours beside each other in memory.
+//! The compliance between the vertices of a finger, stored so that neighbours are close in memory.
 
 use crate::error::ModelError;
 

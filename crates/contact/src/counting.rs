@@ -1,4 +1,4 @@
-//! What counts towards a frame's budget of work.
+//! The work of the parts of a frame, in the units of its budget.
 
 use crate::answer::Effort;
 use crate::objects::View;

@@ -1,11 +1,13 @@
-//! Tangential forces below Coulomb's bound of given normal forces.
+//! Solves for tangential forces below Coulomb's bound, for given normal forces.
 //!
-//! Finds `q_i` with `|q_i| <= b_i` such that points slip by `w = M q + s` against the force at its
-//! bound, or not at all: `q_i = P_i(q_i - r w_i)` for any `r > 0`, with the projection `P_i` to the
-//! disc of radius `b_i`. That minimises `q M q / 2 + s q` over the discs. Projected gradients with
-//! Nesterov's acceleration, which starts anew where it turns back (O'Donoghue & Candes,
-//! *Foundations of Computational Mathematics* 15, 2015). Each point has a step of its own: sums of
-//! absolute values along rows bound `M` from above.
+//! Given the tangential compliance `M`, the slip `s` without tangential forces, and the bounds
+//! `b_i`, it finds `q_i` with `|q_i| <= b_i`. The slip is `w = M q + s`. A point slips only if its
+//! force is at the bound, and then against the force. This is `q_i = P_i(q_i - r w_i)` for any `r >
+//! 0`, with the projection `P_i` onto the disc of radius `b_i`; it minimises `q M q / 2 + s q` over
+//! the discs. The method is projected gradients with Nesterov's acceleration, restarted when the
+//! direction turns back (O'Donoghue & Candes, *Foundations of Computational Mathematics* 15, 2015).
+//! Each point has a step length of its own, from the sums of absolute values along the rows of `M`,
+//! which bound `M` from above.
 
 use crate::kernels::multiply;
 

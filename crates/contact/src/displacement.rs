@@ -1,4 +1,4 @@
-//! How far what presses moves the skin: all of it, not only what lies near the contact.
+//! How far the whole skin moves under the forces of a contact, also far from it.
 
 use crate::answer::Contact;
 use crate::model::ContactModel;

@@ -1,8 +1,9 @@
 //! The file of a contact model, which `fe-datagen contact` writes.
 //!
-//! One text line, a header in JSON on a second line, and a zlib stream of little-endian arrays in the
-//! order of [`Arrays`]: f32, indices u32; before the compliance the parents of its [`packed`] form,
-//! u32; the second order f16, each array in its largest value's 32768th, which leads it as f32.
+//! It has one line of text, a header in JSON on a second line, and a zlib stream of little-endian
+//! arrays in the order of [`Arrays`]. Floats are f32 and indices u32. Before the compliance stand
+//! the parents of its [`packed`] form, u32. The arrays of the second order are f16, in units of the
+//! greatest value of the array divided by 32768; that value stands before the array as f32.
 
 use crate::error::ModelError;
 use crate::model::{Arrays, ContactModel, Header, lengths};

@@ -1,4 +1,4 @@
-//! Contact under a net force: how far things have to travel.
+//! Contact under a net force: how far objects have to travel until they press with it.
 
 use crate::answer::{Contact, Effort};
 use crate::error::ContactError;

@@ -1,8 +1,9 @@
-//! Gaps of the undeformed skin in place of objects.
+//! Gaps of the undeformed skin, given in place of objects.
 //!
-//! Distances of neighbouring vertices from a thing tell the direction of its surface: their slope
-//! along the skin is the tangential part of the thing's outward normal, and a distance has a slope
-//! of one. A displaced vertex is then `gap + n . u` away; the thing's curvature is not known.
+//! The gaps of neighbouring vertices give the direction of an object's surface. Their slope along
+//! the skin is the tangential part of the outward normal, and the gradient of a distance has length
+//! one. The gap of a vertex that is displaced by `u` is then `gap + n . u`. The curvature of the
+//! object is not known.
 
 use crate::error::ContactError;
 use crate::model::ContactModel;

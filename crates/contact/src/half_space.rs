@@ -1,4 +1,5 @@
-//! The half-space in place of the finger: what its shape, bone and layers are worth.
+//! A half-space in place of the finger, for comparison: it shows what shape, bone and layers are
+//! worth.
 
 use crate::error::ModelError;
 use crate::model::{Arrays, ContactModel, Header};

@@ -1,10 +1,10 @@
-//! Bodies that stay on the side from which they came.
+//! Bodies that are held on the side from which they came.
 //!
-//! The nearest surface of a body is the one in the skin's way only while the body is thick and not
-//! deep. A body that is held counts with all places that it left on its way in: from a place in
-//! the skin one looks along the way in, and the last surface that one meets, the body's front, is in
-//! the way. Nothing lies on the far side, so that nothing pulls; it is drawn back to where the model
-//! is trusted.
+//! The nearest surface of a body is the one that presses only as long as the body is thick and not
+//! deep. For a held body, the solver looks from a point of the skin along the way in of the body.
+//! The last surface of the body on this line is its front, and only the front presses. So no force
+//! pulls the skin outwards. A body that is deeper than the training data is moved back to their
+//! depth.
 
 use crate::object::{Object, local};
 use papilla_sdf::{Distance, Placement, SignedDistance};

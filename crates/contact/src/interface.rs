@@ -1,14 +1,17 @@
-//! What waves of traction on layered skin do at the interface below its first layer.
+//! The response of layered skin at the interface below its first layer to waves of traction on the
+//! surface.
 //!
-//! Of a wave of wave number k that runs along x: tractions `q_k` along x, `q_t` across it and the
-//! pressure `p` on the surface give, at the interface, the in-plane strains and the traction
+//! A wave has the wave number k and runs along x. On the surface it has the tractions `q_k` along x
+//! and `q_t` across, and the pressure `p`. At the interface these give the in-plane strains and the
+//! traction
 //!
 //! ```text
 //! e_kk = k (U_q i q_k - U_p p)        s_kz = T_q q_k + i T_p p
 //! e_kt = (i k / 2) U_t q_t            s_zz = i S_q q_k - S_p p        s_tz = T_t q_t
 //! ```
 //!
-//! which are the same on both sides of it. The eight numbers are real; [`Response`] has them.
+//! They are the same on both sides of the interface. The eight factors are real; [`Response`] holds
+//! them.
 
 use crate::layer::Layer;
 use crate::layers::{Block, WaveTable, part_of, times};

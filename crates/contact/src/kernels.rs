@@ -1,7 +1,7 @@
-//! Sums and products over f32 vectors, in the widest vectors of the processor.
+//! Sums and products over f32 vectors, in the widest vectors of the processor that are used.
 //!
-//! What runs over vectors is a type with [`WithSimd`]: a closure is compiled for the plainest
-//! processor unless the compiler happens to inline it.
+//! The code that runs over vectors is a type with [`WithSimd`]. A closure would be compiled for the
+//! plainest processor, unless the compiler happened to inline it.
 
 use crate::compliance::{Compliance, TILE, TILE_LEN};
 use pulp::{Arch, Simd, WithSimd};

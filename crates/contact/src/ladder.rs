@@ -1,4 +1,4 @@
-//! Ways to find pressure, from fast and rough to slow and exact.
+//! The methods that find pressure at the vertices, from the fastest to the most accurate.
 
 /// A way to find pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

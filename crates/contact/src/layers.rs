@@ -1,4 +1,5 @@
-//! How layered skin gives way under waves of pressure: plane layers, one wave number at a time.
+//! The compliance of layered skin under waves of pressure: plane layers, for one wave number at a
+//! time.
 
 use crate::layer::Layer;
 use std::f64::consts::TAU;

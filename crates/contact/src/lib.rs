@@ -1,9 +1,9 @@
-//! From where things are to what presses on a finger: contact in real time.
+//! Contact in real time: from the poses of objects to the pressure on a finger.
 //!
 //! A [`ContactModel`] holds how a finger's skin moves under forces. A [`Solver`] finds the
 //! pressure that keeps the skin out of [`Object`]s, frame by frame:
 //! `p >= 0`, `gap >= 0`, `p gap = 0` at every vertex, on the displaced skin.
-//! In prose, with what accuracy costs in time: `docs/concepts/contact.md`.
+//! Explained, with the error and the time of each method, in `docs/concepts/contact.md`.
 //!
 //! ```
 //! use papilla_contact::{Arrays, Contact, ContactModel, Header, Object, Settings, Solver};

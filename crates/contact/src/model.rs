@@ -1,4 +1,4 @@
-//! What is known of a finger before anything touches it: the contact model.
+//! The contact model: what is known of a finger before anything touches it.
 
 use crate::clusters::Clusters;
 use crate::compliance::Compliance;

@@ -1,4 +1,4 @@
-//! What a vertex meets first, of whatever a frame describes.
+//! The nearest object of a vertex, whether a frame describes objects or gaps.
 
 use crate::error::ContactError;
 

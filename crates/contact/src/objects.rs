@@ -1,4 +1,4 @@
-//! What can press on a finger, and how far it is.
+//! What can press on a finger, and its distance from a point.
 
 use crate::answer::Effort;
 use crate::budget;

@@ -1,9 +1,10 @@
-//! Compliance in few bytes: whole steps, told by what neighbours do, a residual mostly in one byte.
+//! Stores compliance in few bytes: whole steps, predicted from neighbours, with residuals that
+//! mostly take one byte.
 //!
-//! How far a vertex moves changes little from it to its neighbour, and from a force to the one
-//! beside it. Each vertex has a parent, the nearest one before it. Of the steps `q` the file holds
-//! `q[i][k] - q[p(i)][k] - q[i][p(k)] + q[p(i)][p(k)]`, a mixed second difference, from which they
-//! come back exactly.
+//! The displacement of a vertex differs little from that of its neighbour, and from that under a
+//! force at the next vertex. Each vertex i has a parent p(i), the nearest one of those before it.
+//! Of the steps `q` the file holds `q[i][k] - q[p(i)][k] - q[i][p(k)] + q[p(i)][p(k)]`, a mixed
+//! second difference, from which the steps are found again exactly.
 
 use std::io::{self, Read};
 

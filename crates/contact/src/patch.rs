@@ -1,8 +1,8 @@
-//! The vertices that may be in contact, and how they move each other.
+//! The vertices that may be in contact, and the compliance between them.
 //!
-//! Compliance of a whole finger does not fit a cache. A patch holds the blocks of its own vertices
-//! densely, from frame to frame: a vertex that comes costs a row and a column. The
-//! first [`Patch::near`] slots are those that can carry force.
+//! The compliance of a whole finger does not fit into a cache. A patch stores the blocks of its own
+//! vertices densely and keeps them from frame to frame, so that a new vertex costs one row and one
+//! column. The first [`Patch::near`] slots are those that can carry force.
 
 use crate::kernels::{Along, Displace, run};
 use crate::model::ContactModel;

@@ -1,4 +1,4 @@
-//! Forces on some of the vertices, and how far they move others.
+//! Forces at some of the vertices, and how far they move other vertices.
 
 use crate::kernels::{DisplaceTiles, Vectors, run};
 use crate::model::ContactModel;

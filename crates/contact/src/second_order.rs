@@ -1,11 +1,11 @@
-//! Finite strain to second order: how far the skin moves beyond what its compliance says.
+//! Finite strain to second order: how far the skin moves beyond its compliance.
 //!
-//! Equilibrium of a hyperelastic body is `K u + r(u) = f` with the tangent at rest `K` and
-//! internal forces `r` of second and higher order. Its expansion in the forces is
-//! `u = C f + Q(f, f) + ...` with `C = K^-1` and `Q(f, f) = -K^-1 r''(C f, C f) / 2`. Here `Q` acts
-//! on the amplitudes `z` of R load modes, and its values are combinations of K displacements.
-//! A series in the force turns round at some force; the share of the second order is therefore
-//! bounded smoothly, which changes nothing where the series is worth its name.
+//! The equilibrium of a hyperelastic body is `K u + r(u) = f`, with the tangent at rest `K` and
+//! internal forces `r` of second and higher order. Its expansion in the forces is `u = C f + Q(f,
+//! f) + ...`, with `C = K^-1` and `Q(f, f) = -K^-1 r''(C f, C f) / 2`. Here `Q` acts on the
+//! amplitudes `z` of R load modes, and its values are combinations of a number of stored
+//! displacements. A series in the force is wrong for large forces. Therefore the share of the
+//! second order is limited smoothly, which changes nothing where the share is small.
 
 use crate::kernels::{add_scaled, dot, product, run};
 use pulp::{Simd, WithSimd};

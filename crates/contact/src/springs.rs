@@ -1,7 +1,8 @@
-//! The baseline: a spring for each vertex.
+//! The baseline: an independent spring at each vertex.
 //!
-//! `p = k max(0, d - relief d_max)^n` with the penetration `d` of the undeformed vertex and that
-//! of the deepest one. Constants are a fit to FE indentations: `studies/reports/penetration.md`.
+//! The pressure is `p = k max(0, d - relief d_max)^n`, with the depth `d` of the undeformed vertex
+//! in the object and the greatest depth `d_max`. How the constants were fitted:
+//! `studies/reports/penetration.md`.
 
 use crate::answer::{Contact, Person};
 use crate::model::ContactModel;

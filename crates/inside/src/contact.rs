@@ -1,4 +1,4 @@
-//! Contact alone: where things are in, what pushes back out.
+//! Contact alone: from poses or gaps to force and pressure.
 
 use std::sync::{Arc, MutexGuard, PoisonError};
 

@@ -1,9 +1,9 @@
-//! Papilla inside a program: a folder of models read once, and sessions that render on the caller's
-//! thread. The native library for C and the Python package stand on it.
+//! Papilla inside a program: a folder of models that is read once, and sessions that compute on the
+//! thread of the caller. The native library for C and the Python package use it.
 //!
-//! [`Session`] takes the protocol's hello and frames as the service does, and makes the same
-//! sections of an answer; only sockets, queues and deadlines are missing. [`Contact`] is one finger
-//! that is touched, and [`Feel`] what is felt of SED that is known, both without a network.
+//! [`Session`] takes the hello and the frames of the protocol as the service does, and writes the same
+//! sections of answers, without sockets, queues and deadlines. [`Contact`] finds contact on one
+//! finger, and [`Feel`] computes effects of SED that is known. Neither runs a network.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,9 +1,9 @@
-//! What a session asks for beside the SED map; one file an effect.
+//! The effects of a session: what it asks for beside the map of SED. Each effect has a file.
 //!
-//! A frame meets them in this order: `relaxation` before the network, `shear_energy` after it (the
-//! session's finger, which knows traction, works it out), `afferents` and `spikes`, and then whatever
-//! reads their results. **Invariant:** what the hello did not name is neither
-//! computed nor allocated; what it named allocates at the hello and never in a frame.
+//! A frame passes them in this order: `relaxation` before the network, `shear_energy` after it (the
+//! finger of the session computes it, since it knows the traction), `afferents` and `spikes`, and then
+//! those that use their results. **Invariant:** an effect that the hello did not name is neither
+//! computed nor allocated. One that it named takes its memory at the hello, and none in a frame.
 //!
 //! ```
 //! use bytes::BytesMut;

@@ -1,4 +1,4 @@
-//! How pressure is found of where things are, and what each way errs.
+//! The methods that find pressure from objects or gaps, and the error of each.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Where things are, in place of pressure, and what pushes back.
+//! Frames that say where objects are, in place of pressure, and the section `touch` of answers.
 //!
 //! A hello says what its frames hold with `input`, and announces objects and fingers.
 //!

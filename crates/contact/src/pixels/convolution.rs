@@ -1,4 +1,4 @@
-//! Products with a compliance that is the same everywhere, on a window of pixels.
+//! Products with the compliance of the layers, which is the same everywhere, on a window of pixels.
 
 use crate::layers::SurfaceCompliance;
 use papilla_fft::{Grid, Line, Scratch, Wave};

@@ -1,4 +1,5 @@
-//! What pixels keep from frame to frame: the start of the next one, elsewhere as here.
+//! What contact on pixels keeps from frame to frame, as the start of the next frame here or in
+//! another process.
 
 use super::PixelContact;
 

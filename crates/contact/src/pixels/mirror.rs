@@ -1,8 +1,8 @@
-//! A plane at the end of the map's columns that the skin cannot leave: skin goes on behind it as in
-//! a mirror.
+//! The plane at which the map ends towards the hand, and which the skin cannot leave: the skin goes
+//! on behind it as in a mirror.
 //!
-//! The finger's base plane is one: what stands on it slides in it and moves no other way, so that
-//! skin presses there, and is dented, as the half of a skin that is alike on both sides.
+//! This is the base plane of the finger. Points in it slide along it and move in no other way. So
+//! the skin deforms there like one half of a skin that is the same on both sides of the plane.
 
 use super::smooth;
 use crate::model::ContactModel;

@@ -1,4 +1,4 @@
-//! How the pixels of a window move each other.
+//! The compliance between the pixels of a window.
 
 use super::convolution::{Cells, Convolution};
 use crate::bounded::Operator;

@@ -1,13 +1,14 @@
-//! What a force at a vertex does to its own neighbourhood: the skin's dent in place of the mesh's.
+//! Replaces the dent that a force at a vertex makes in the mesh by that of the layered skin.
 //!
-//! A force at a vertex of linear elements moves that vertex 2.3 times as far as pressure on its hat
-//! moves layered skin, and its neighbours too little. The difference `C - K` of the two
-//! compliances, of which only what is far away is the finger's, is smooth but for that. Near
-//! the force it goes on as the polynomial of second degree through what is round it.
+//! A force at a vertex of linear elements moves that vertex 2.3 times as far as the same force
+//! moves layered skin, when it is spread over the vertex' hat function; its neighbours move too
+//! little. In the difference `C - K` of the compliances of mesh and layers, only what is far away
+//! belongs to the finger. It is smooth, but for the surroundings of the force. There it is
+//! continued by the polynomial of second degree through the values around.
 //!
-//! An even load moves the mesh's skin by what is right: there dents only add up. So a correction
-//! makes no volume; what it takes away near the force it gives back on some more vertices. A dot
-//! finds the layers' dent, a plate the mesh's stiffness: also where the finger's layers are not `K`'s.
+//! Under an even load the mesh moves as far as it should, since such dents only add up. So a
+//! correction makes no volume: what it takes away near the force is given back at some more
+//! vertices. A dot then gets the dent of the layers, and a plate the stiffness of the mesh.
 
 use super::convolution::{Cells, Convolution, Plans};
 use super::mirror::Mirror;

@@ -1,4 +1,4 @@
-//! A frame on pixels: rounds of vertices and pixels in turn.
+//! A frame on pixels: vertices and pixels are solved in turn, in rounds.
 
 use super::nearby::Nearby;
 use super::{JUMP, PixelContact, unit_pa};

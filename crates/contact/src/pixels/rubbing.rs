@@ -1,16 +1,16 @@
 //! Traction along the skin on pixels.
 //!
-//! Vertices find where skin sticks and where it slips, by their normal forces `N_v` and their forces along
-//! the skin `Q_v`. At a pixel under the pressure `p` the traction is
+//! The vertices find where the skin sticks and where it slips, by their normal forces `N_v` and
+//! their forces along the skin `Q_v`. At a pixel under the pressure `p` the traction is
 //!
 //! ```text
 //! q = p r,   r = sum_v w_v Q_v / sum_v w_v N_v,   |r| <= mu
 //! ```
 //!
-//! with the weights `w_v` of the corners of its triangle; of `r` the part along the surface of the
-//! thing that is touched counts. Where none of the corners is under force, `r` is that of the whole
-//! contact. So what sticks or slips at vertices does so on pixels, and what slips altogether is
-//! pulled with `mu` times the pixels' normal force.
+//! The `w_v` are the weights of the corners of its triangle. Of `r` only the part along the surface
+//! of the object counts. If no corner is under force, `r` is that of the whole contact. So what
+//! sticks or slips at vertices does so on pixels. Skin that slips everywhere is pulled with `mu`
+//! times the normal force of the pixels.
 
 use super::PixelSkin;
 use super::window::Window;

@@ -1,4 +1,4 @@
-//! What pixels have to know of a skin.
+//! What contact on pixels needs to know of the skin.
 
 use super::convolution::Plans;
 use super::mirror::Mirror;

@@ -1,4 +1,5 @@
-//! Values between vertices, smoother than the triangles' planes.
+//! Interpolation of values between vertices by polynomials of second degree, smoother than linear
+//! on each triangle.
 
 use papilla_atlas::{Atlas, Patch, Raster};
 

@@ -1,4 +1,5 @@
-//! Forces of the vertices, from round to round and from frame to frame.
+//! The forces that vertices and pixels hand to each other, from round to round and from frame to
+//! frame.
 
 use super::JUMP;
 

@@ -1,16 +1,17 @@
-//! What traction along the skin adds to strain energy density (SED) at the interface.
+//! What traction along the skin adds to the strain energy density (SED) at the interface.
 //!
-//! Networks make SED of pressure alone. Layered skin's closed form tells the strain at the interface
-//! that pressure and traction make together, and what pressure makes alone; the difference of their
-//! energies, on the dermis' side, goes on top of the network's:
+//! Networks compute SED from pressure alone. The closed form for layered skin gives the strain at
+//! the interface that pressure `p` and traction `q` make together, and the strain that `p` makes
+//! alone. The difference of their energies `E`, on the dermis' side, is added to the SED of the
+//! network:
 //!
 //! ```text
-//! SED = SED of the network (p) + E(e(p) + e(q)) - E(e(p)),   at least 0
+//! SED = network(p) + E(e(p) + e(q)) - E(e(p)),   at least 0
 //! ```
 //!
-//! Strains are small and skin is plane here; of a difference that is a part of SED their error is a
-//! part too. The map is taken by 2 x 2 pixels (.27 mm; the vertices that carry traction are .7 mm
-//! apart), as one period of waves.
+//! In this form strains are small and the skin is plane. The error of these assumptions enters only
+//! with the added part. The map is computed on cells of 2 x 2 pixels (.27 mm; the vertices that
+//! carry traction are .7 mm apart), as one period of waves.
 
 use crate::PA_PER_MPA;
 use crate::interface::{InterfaceResponse, Response};

@@ -1,4 +1,4 @@
-//! Objects that jumped deep into the skin, brought in by steps.
+//! Moves objects that have jumped deep into the skin in by steps.
 
 use super::{BACK_MAX_MM, ITERATIONS_ON_THE_WAY, SETTLED_MM, STEP_MM, STEPS_MAX, Solver};
 use crate::answer::Effort;

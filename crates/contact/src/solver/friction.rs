@@ -1,11 +1,11 @@
-//! Coulomb friction: what pulls the skin along things that move.
+//! Coulomb friction: the forces along the skin under objects that move.
 //!
-//! A point in contact is carried along by the object that it touches, from where contact began, as
-//! long as `|q| <= mu f`; beyond it slips, and the force stays at `mu f` against the slip. The place
-//! on the object from which it would be carried is its anchor. A frame finds the forces with
-//! [`DiscSolver`] for the normal forces of each linearisation; that settles with them. Afterwards
-//! the anchors of points that slipped follow them, those of points that stuck stay, so that nothing
-//! creeps however many frames an object rests.
+//! An object carries a point in contact along from where contact began, as long as `|q| <= mu f`.
+//! Beyond that the point slips, and its force stays at `mu f` against the slip. The *anchor* is the
+//! place on the object from which the point would be carried. For the normal forces of each
+//! linearisation, [`DiscSolver`] finds the tangential forces; they settle together with the normal
+//! ones. Afterwards the anchors of points that slipped move with the points, and those of points
+//! that stuck stay. So nothing creeps, however many frames an object rests.
 
 use super::{PRODUCTS_MIN, Solver};
 use crate::discs::{DiscSolver, Tangential, size, steps, to_disc};

@@ -1,4 +1,5 @@
-//! Linearisation, complementarity solve and displacement in turn, until displacements settle.
+//! Linearises the gaps, solves for forces and displaces the skin, in turn, until displacements
+//! settle.
 
 use super::{
     FORCE_MIN_N, FRAME_PRODUCTS_MAX, NEAR_MM, PRODUCTS_MAX, PRODUCTS_MIN, RELAXATION, SHARE,

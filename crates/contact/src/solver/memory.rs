@@ -1,4 +1,5 @@
-//! What a solver keeps from frame to frame: the start of the next one, elsewhere as here.
+//! What a solver keeps from frame to frame, as the start of the next frame here or in another
+//! process.
 
 use super::{Anchor, Reached, Side, Solver};
 use crate::bounded::Symmetric;

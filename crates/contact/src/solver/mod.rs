@@ -1,10 +1,10 @@
-//! A finger's contact from frame to frame.
+//! Contact of a finger, from frame to frame.
 //!
 //! A frame linearises the distance of every displaced vertex from the nearest object, solves for
-//! forces along the objects' normals, displaces the vertices under them, and repeats. It starts
-//! from the forces of the last frame. Objects that jumped deep into the skin are drawn back along
-//! the skin's normals and brought in by steps, so that each vertex meets the side that it
-//! would have met on the way.
+//! forces along the normals of the objects, displaces the vertices under them, and repeats. It
+//! starts from the forces of the last frame. Objects that have jumped deep into the skin are moved
+//! back along the normals of the skin and in again by steps, so that each vertex meets the side
+//! that it would have met on the way.
 
 mod approach;
 mod candidates;

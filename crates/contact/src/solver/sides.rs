@@ -1,10 +1,11 @@
-//! From which side each object came, and which of them are held there.
+//! From which side each object came, and which objects are held there.
 //!
-//! A body presses as it lies while its nearest surface faces the skin and no vertex lies deeper than
-//! the model is trusted. Its way out is then the skin's normal, weighed by depth. Where the skin
-//! finds itself behind a body or beyond that depth, the body is [held](crate::held): it keeps the way
-//! out that it had, and the force goes on from that of the trusted depth. A body that is met inside
-//! the finger without a way gets the shortest out, and the answer says so.
+//! An object presses as it lies while its nearest surface faces the skin and no vertex lies deeper
+//! than the model is trusted. Its *way out* is then the mean of the normals of the skin under it,
+//! weighted by depth. If the skin is found behind an object, or deeper than that, the object is
+//! [held](crate::held): it keeps its way out, and its force is continued from that at the trusted
+//! depth. An object that is inside the finger in its first frame gets the shortest way out, and the
+//! answer says so.
 
 use super::candidates::Seen;
 use crate::answer::Effort;

@@ -1,4 +1,4 @@
-//! How the skin moves under forces on it: the finger's compliance at rest.
+//! The compliance of the undeformed finger: how the skin moves under forces on it.
 
 use super::InfluenceError;
 use super::build::{Columns, Load, loads, small_strain_patch, tangent_at_rest};

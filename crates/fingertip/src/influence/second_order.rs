@@ -1,4 +1,4 @@
-//! How the skin moves to second order in the forces on it: finite strain's first word.
+//! How the skin moves to second order in the forces on it: the first term of finite strain.
 //!
 //! Equilibrium `K u + r(u) = f` gives `u = C f - C r''(C f, C f) / 2 + ...`. The forces are taken
 //! as R load modes, which the loads at hand call for; the second derivative `r''` of the internal

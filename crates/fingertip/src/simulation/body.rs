@@ -1,4 +1,5 @@
-//! A body pressed by a rigid plate: set-up, pose, and vertex values.
+//! A body that is pressed, by an indenter or by a given pressure: its set-up, and the record of an
+//! equilibrium.
 
 use super::record::IncrementRecord;
 use crate::geometry::fingertip::FingertipShapeError;

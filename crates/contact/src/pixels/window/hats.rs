@@ -1,4 +1,5 @@
-//! Between pixels and vertices: pressure that is linear between vertices, and its sums over them.
+//! Pressure that is linear between vertices, and sums of the pressure on pixels over the hat
+//! functions of the vertices.
 
 use super::Window;
 use crate::model::ContactModel;

@@ -1,4 +1,4 @@
-//! The part of the skin that things are near: its pixels, and the vertices that move them.
+//! The window: the part of the skin near objects, its pixels, and the vertices that move them.
 
 mod gaps;
 mod hats;

@@ -1,4 +1,4 @@
-//! Which pixels and vertices a frame takes.
+//! Which pixels and vertices belong to the window of a frame.
 
 use super::{BETWEEN, NONE, Window};
 use crate::answer::Effort;
