@@ -5,6 +5,9 @@
 //! *Optimal Quadratic Programming Algorithms*, 2009, algorithm 5.8). Conjugate gradients on
 //! the points in contact, a projected step where one of them would be pulled, a step towards
 //! contact where points outside penetrate. One product with `M` an iteration, or two.
+//!
+//! Points that would be pulled let go one by one. Where an operator asks for it, all of them let go in
+//! one step, as Polonsky and Keer do (Wear 231, 1999), if energy then falls by no less.
 
 use crate::kernels::{multiply, product as dot, run};
 use pulp::{Simd, WithSimd};
@@ -42,6 +45,11 @@ pub(crate) trait Operator {
     /// symmetric and positive definite among the points under force.
     fn towards_inverse(&self, r: &[f32], _f: &[f32], z: &mut [f32]) {
         z.copy_from_slice(r);
+    }
+    /// Whether all that would be pulled may let go in one step, if that gains more: fewer products where
+    /// contact shrinks.
+    fn lets_go_at_once(&self) -> bool {
+        false
     }
 }
 
@@ -243,6 +251,24 @@ impl<M: Operator> WithSimd for Improve<'_, M> {
                     direction[i] = towards[i] - turn * direction[i];
                 }
             } else {
+                restart = true;
+                if m.lets_go_at_once() {
+                    // All of the step, as far as nothing is pulled.
+                    for i in 0..n {
+                        towards[i] = (f[i] - length * direction[i]).max(0.0) - f[i];
+                    }
+                    m.times(towards, chopped);
+                    effort.products += 1;
+                    let change = dot(gradient, towards) + 0.5 * dot(towards, chopped);
+                    let due = longest * (0.5 * longest * bends - dot(gradient, direction));
+                    if change <= due {
+                        for i in 0..n {
+                            f[i] = (f[i] + towards[i]).max(0.0);
+                            gradient[i] += chopped[i];
+                        }
+                        continue;
+                    }
+                }
                 // To the first point that lets go, then a projected step of fixed length.
                 for i in 0..n {
                     f[i] = (f[i] - longest * direction[i]).max(0.0);
@@ -258,7 +284,6 @@ impl<M: Operator> WithSimd for Improve<'_, M> {
                 m.times(direction, product);
                 add_scaled(gradient, 1.0, product);
                 effort.products += 1;
-                restart = true;
             }
         }
     }

@@ -55,6 +55,10 @@ pub(super) struct Convolution {
     scratch: Scratch,
     /// `[columns / 2 + 1][rows]`: compliance over the number of pixels, mm/MPa.
     compliance: Vec<f32>,
+    /// The window that it is of; the same of the window before.
+    told_for: Option<(usize, usize, [i32; 2])>,
+    earlier: Vec<f32>,
+    earlier_for: Option<(usize, usize, [i32; 2])>,
 }
 
 impl fmt::Debug for Convolution {
@@ -77,6 +81,9 @@ impl Convolution {
             grid: vec![0.0; LENGTH_MAX * LENGTH_MAX],
             waves: vec![Wave::new(0.0, 0.0); half],
             compliance: vec![0.0; half],
+            told_for: None,
+            earlier: vec![0.0; half],
+            earlier_for: None,
         }
     }
 
@@ -101,13 +108,25 @@ impl Convolution {
         let wave = |index: usize, length: usize, pitch_mm: f64| {
             TAU * index.min(length - index) as f64 / (length as f64 * pitch_mm)
         };
+        // Frames to and fro over a step of the distance, or of the window's size, find their table again.
+        std::mem::swap(&mut self.compliance, &mut self.earlier);
+        std::mem::swap(&mut self.told_for, &mut self.earlier_for);
+        if self.told_for == Some(window) {
+            return;
+        }
+        self.told_for = Some(window);
         let pixels = (self.rows * self.columns) as f64;
         for column in 0..=self.columns / 2 {
             let x = wave(column, self.columns, along_mm);
-            for row in 0..self.rows {
+            let table = &mut self.compliance[column * self.rows..][..self.rows];
+            for row in 0..=self.rows / 2 {
                 let y = wave(row, self.rows, across_mm);
                 let k = (x * x + y * y).sqrt();
-                self.compliance[column * self.rows + row] = (surface.at(k) / pixels) as f32;
+                table[row] = (surface.at(k) / pixels) as f32;
+            }
+            // Waves up are as waves down.
+            for row in self.rows / 2 + 1..self.rows {
+                table[row] = table[self.rows - row];
             }
         }
     }

@@ -1,7 +1,7 @@
 //! What contact on pixels keeps from frame to frame, as the start of the next frame here or in
 //! another process.
 
-use super::PixelContact;
+use super::{PixelContact, Shown};
 
 /// The warm start of a [`PixelContact`]: from the same memory, and the solver's, the same frame
 /// gets the same bits. Empty if the next frame starts from nothing.
@@ -61,6 +61,7 @@ impl PixelContact {
         if vertices.is_empty() {
             return true;
         }
+        self.shown = Shown::all();
         let without = self.turns.recall();
         self.window.force_n.iter_mut().for_each(|f| f.fill(0.0));
         for (vertex, forces) in vertices.iter().zip(forces_n) {

@@ -41,6 +41,7 @@ mod nearby;
 mod own_dents;
 mod rounds;
 mod rubbing;
+mod shown;
 mod skin;
 mod smooth;
 mod spacing;
@@ -54,11 +55,13 @@ use crate::error::ContactError;
 use crate::force_target::{NetForce, Search};
 use crate::model::ContactModel;
 use crate::object::Object;
+use crate::objects::View;
 use crate::second_order::Amplitudes;
-use crate::solver::Solver;
+use crate::solver::{Solver, Until};
 use convolution::Convolution;
 use papilla_atlas::MAP_LEN;
 use rubbing::Rubbing;
+use shown::Shown;
 use std::sync::Arc;
 use turns::Turns;
 use window::Window;
@@ -70,6 +73,9 @@ pub use spacing::PixelSpacing;
 /// Change of the vertices' displacement that ends what they find by themselves, reference mm: pixels
 /// only go on by its change from frame to frame.
 const AT_VERTICES_MM: f32 = 5e-4;
+/// Most linearisations at vertices in a frame that starts from the last one. Under blades they go to and
+/// fro and never settle; pixels need no more than their mean.
+const AT_VERTICES_MAX: u32 = 8;
 /// Change of the forces without pixels, of their sum, up to which the last frame is a start.
 const JUMP: f32 = 0.5;
 /// Pixels settle to a hundredth of the force: [`rounds`].
@@ -98,6 +104,8 @@ pub struct PixelContact {
     /// By pixel of the map: what pixels hold, and its means over pixels, Pa.
     held_pa: Vec<f32>,
     map_pa: Vec<f32>,
+    /// Where on the map they may be other than zero.
+    shown: Shown,
     peak_pa: f32,
 }
 
@@ -117,7 +125,7 @@ impl Solver {
     ) -> Result<(), ContactError> {
         self.within(objects.into(), 0.0, |solver, view| {
             (solver.sides.toward, solver.sides.fine) = (None, true);
-            solver.frame_until(AT_VERTICES_MM, view, out)?;
+            solver.frame_until(pixels.at_vertices(view), view, out)?;
             pixels.refine(solver, solver.held(view), out)?;
             solver.end_frame(view, out);
             Ok(())
@@ -148,7 +156,7 @@ impl Solver {
             }
             let taken = (&mut effort, &mut *out);
             let travel = solver.travel_until(view, net, PIXELS, taken, |solver, view, out| {
-                solver.frame_until(AT_VERTICES_MM, view, out)?;
+                solver.frame_until(pixels.at_vertices(view), view, out)?;
                 pixels.refine(solver, solver.held(view), out)
             })?;
             solver.follow_slip(view);
@@ -174,6 +182,7 @@ impl PixelContact {
             pressure: vec![0.0; pixels],
             held_pa: vec![0.0; MAP_LEN],
             map_pa: vec![0.0; MAP_LEN],
+            shown: Shown::default(),
             peak_pa: 0.0,
             skin,
         }
@@ -183,6 +192,13 @@ impl PixelContact {
     #[must_use]
     pub fn map_pa(&self) -> &[f32] {
         &self.map_pa
+    }
+
+    /// When vertices have found enough by themselves. Where they slip is found by them alone.
+    fn at_vertices(&self, view: View<'_>) -> Until {
+        let all = Until::within(AT_VERTICES_MM);
+        let is_few = self.turns.is_warm() && !view.is_rough();
+        if is_few { Until { iterations_max: AT_VERTICES_MAX, ..all } } else { all }
     }
 
     /// Greatest pressure of the last frame, Pa.
@@ -207,17 +223,24 @@ impl PixelContact {
 
     /// Forgets the last frame.
     pub fn reset(&mut self) {
-        self.held_pa.fill(0.0);
-        self.map_pa.fill(0.0);
+        self.clear_map();
         self.peak_pa = 0.0;
         self.turns.forget();
+    }
+
+    /// Nothing is held.
+    fn clear_map(&mut self) {
+        let range = self.shown.range();
+        self.held_pa[range.clone()].fill(0.0);
+        self.map_pa[range].fill(0.0);
+        self.shown = Shown::default();
     }
 
     /// Sums what pixels hold; `strength` multiplies it, and has a slope.
     fn answer(&mut self, solver: &Solver, out: &mut Contact) {
         let (model, person) = (&solver.model, solver.person());
         let strength = solver.strength();
-        let Self { window, pressure, held_pa, map_pa, peak_pa, skin, rubbing, .. } = self;
+        let Self { window, pressure, held_pa, map_pa, shown, peak_pa, skin, rubbing, .. } = self;
         *peak_pa = 0.0;
         let unit_pa = unit_pa(person);
         let Contact { quality, effort, stiffness_n_per_mm, .. } = *out;
@@ -240,14 +263,16 @@ impl PixelContact {
             out.penetration_mm = out.penetration_mm.max(f64::from(p * window.give[i]));
             let index = skin.raster.indices()[window.entries[i] as usize];
             held_pa[index as usize] = p * unit_pa;
-            window.spread(skin, index as usize, p * unit_pa, map_pa);
+            window.spread(skin, i, p * unit_pa, map_pa);
+            shown.take(index as usize);
         }
-        // Beside steep edges a cubic falls below zero.
-        map_pa.iter_mut().for_each(|p| *p = p.max(0.0));
-        if let Some((strength, _)) = strength {
-            map_pa.iter_mut().for_each(|p| *p *= strength as f32);
+        shown.widen(window.reach());
+        let strength_pa = strength.map_or(1.0, |(strength, _)| strength as f32);
+        for p in &mut map_pa[shown.range()] {
+            // Beside steep edges a cubic falls below zero.
+            *p = p.max(0.0) * strength_pa;
+            *peak_pa = peak_pa.max(*p);
         }
-        *peak_pa = map_pa.iter().copied().fold(0.0, f32::max);
         for vertex in 0..model.vertices() {
             let p = window.vertex_pressure(vertex);
             if p > 0.0 {

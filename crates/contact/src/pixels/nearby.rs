@@ -16,6 +16,9 @@ pub(super) struct Nearby<'a> {
     /// `1 / h^2` by the pixels' distances `h` down and along rows, and `k^2` by the wave number in
     /// the middle, mm^-2.
     pub bends: [f32; 3],
+    /// Whether the frame starts from the last one's pressure: contact that shrinks then does so by
+    /// whole rows of pixels.
+    pub is_warm: bool,
 }
 
 impl Operator for Nearby<'_> {
@@ -29,6 +32,10 @@ impl Operator for Nearby<'_> {
         for (((cell, (give, ease)), x), y) in self.cells.own.iter().zip(gives).zip(x).zip(y) {
             *y = grid[*cell as usize] + (give + ease) * x;
         }
+    }
+
+    fn lets_go_at_once(&self) -> bool {
+        self.is_warm
     }
 
     /// Compliance falls as `1 / k` with the wave number: `-laplacian + k^2` over it is as large for

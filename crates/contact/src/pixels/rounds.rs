@@ -27,7 +27,7 @@ impl PixelContact {
         view: View<'_>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        let Self { skin, window, pressure, map_pa, held_pa, turns, rubbing, .. } = self;
+        let Self { skin, window, pressure, held_pa, turns, rubbing, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
         if !window.open(skin, model, solver.near(), view, &mut out.effort) {
             self.reset();
@@ -42,19 +42,18 @@ impl PixelContact {
             self.reset();
             return Ok(());
         }
-        let warm = turns.begin(&mut window.force_n);
+        let warm = turns.begin(&window.ids, &mut window.force_n);
         if warm {
             for (p, entry) in pressure.iter_mut().zip(&window.entries) {
                 *p = held_pa[skin.raster.indices()[*entry as usize] as usize] / unit_pa;
             }
         }
-        held_pa.fill(0.0);
-        map_pa.fill(0.0);
+        self.clear_map();
         let mut change = self.rounds(solver, view, warm, &mut out.effort);
         if change.is_none() {
             // What runs away starts once more, from what vertices find.
             self.turns.forget();
-            self.turns.begin(&mut self.window.force_n);
+            self.turns.begin(&self.window.ids, &mut self.window.force_n);
             change = self.rounds(solver, view, false, &mut out.effort);
         }
         let Some(change) = change else {
@@ -170,7 +169,8 @@ impl PixelContact {
         let beside = &window.beside[..m];
         let bends = convolution.bends();
         let unit = convolution.work();
-        let nearby = Nearby { convolution, cells, give, ease, norm, beside, bends };
+        let is_warm = turns.starts_warm();
+        let nearby = Nearby { convolution, cells, give, ease, norm, beside, bends, is_warm };
         let p = &mut pressure[..m];
         let most = view.most(PRODUCTS_MAX, unit, effort).max(PRODUCTS_MIN);
         let products = bounded.improve(nearby, gradient, p, VIOLATION_MM, most).products;

@@ -37,11 +37,16 @@ pub(super) struct Turns {
     residual: Vectors,
     from: Vectors,
     before: Vectors,
+    /// Vertices, in their order, of which one of all these is not zero, or can become so.
+    active: Vec<u32>,
+    is_active: Vec<bool>,
     rounds: usize,
     /// Part of the residual that late rounds take, and the last round's change over the forces.
     taken: f32,
     change: f32,
+    /// Whether the next frame starts from this one, and this one from the last.
     warm: bool,
+    started_warm: bool,
 }
 
 impl Turns {
@@ -55,10 +60,13 @@ impl Turns {
             residual,
             from,
             before,
+            active: Vec::with_capacity(vertices),
+            is_active: vec![false; vertices],
             rounds: 0,
             taken: TAKEN,
             change: 0.0,
             warm: false,
+            started_warm: false,
         }
     }
 
@@ -83,6 +91,11 @@ impl Turns {
         self.warm
     }
 
+    /// Whether this frame started from the last one.
+    pub(super) fn starts_warm(&self) -> bool {
+        self.started_warm
+    }
+
     /// Forces that vertices found by themselves in the last frame.
     pub(super) fn found_without_pixels(&self) -> &Vectors {
         &self.without
@@ -96,6 +109,7 @@ impl Turns {
     /// The same, empty and to be filled; the next frame starts from it.
     pub(super) fn recall(&mut self) -> &mut Vectors {
         self.warm = true;
+        self.is_active.fill(true);
         self.without.iter_mut().for_each(|f| f.fill(0.0));
         &mut self.without
     }
@@ -107,35 +121,64 @@ impl Turns {
 
     /// Sets the forces that a frame starts from: those of the last frame, moved on as the vertices
     /// move by themselves; after a jump, theirs. Returns whether the last frame is a start.
-    pub(super) fn begin(&mut self, force_n: &mut Vectors) -> bool {
+    ///
+    /// Forces of this frame are under the window's vertices `ids`.
+    pub(super) fn begin(&mut self, ids: &[u32], force_n: &mut Vectors) -> bool {
+        self.find_active(ids, force_n);
         let (mut change, mut size) = (0.0, 0.0);
-        for (now, last) in self.without.iter().flatten().zip(self.last.iter().flatten()) {
-            change += (now - last).abs();
-            size += now.abs();
+        for i in 0..3 {
+            let (now, last) = (&self.without[i], &self.last[i]);
+            for vertex in self.active.iter().map(|vertex| *vertex as usize) {
+                change += (now[vertex] - last[vertex]).abs();
+                size += now[vertex].abs();
+            }
         }
         let warm = self.warm && change <= JUMP * size;
-        let now = self.without.iter().flatten().zip(self.last.iter().flatten());
-        for (force, (now, last)) in force_n.iter_mut().flatten().zip(now) {
-            *force = if warm { *force + now - last } else { *now };
+        for (i, force) in force_n.iter_mut().enumerate() {
+            let (now, last) = (&self.without[i], &self.last[i]);
+            for vertex in self.active.iter().map(|vertex| *vertex as usize) {
+                let (now, last) = (now[vertex], last[vertex]);
+                force[vertex] = if warm { force[vertex] + now - last } else { now };
+            }
         }
-        (self.rounds, self.warm) = (0, true);
+        (self.rounds, self.warm, self.started_warm) = (0, true, warm);
         warm
+    }
+
+    /// Vertices that are zero in all of this stay so: they need not be gone through.
+    fn find_active(&mut self, ids: &[u32], force_n: &Vectors) {
+        let Self { without, last, residual, from, before, active, is_active, .. } = self;
+        let all = [&*without, last, residual, from, before, force_n];
+        for vertex in active.drain(..).map(|vertex| vertex as usize) {
+            is_active[vertex] = all.iter().any(|of| of.iter().any(|f| f[vertex] != 0.0));
+        }
+        for id in ids {
+            is_active[*id as usize] = true;
+        }
+        for (vertex, is_active) in is_active.iter_mut().enumerate() {
+            *is_active |= without.iter().any(|f| f[vertex] != 0.0);
+            if *is_active {
+                active.push(vertex as u32);
+            }
+        }
     }
 
     /// Moves `force_n` on; returns the change over the sum of forces.
     pub(super) fn take(&mut self, force_n: &mut Vectors) -> f32 {
         let (mut change, mut size, mut was) = (0.0f32, 0.0f32, 0.0f32);
         let (mut along, mut square) = (0.0f32, 0.0f32);
-        let forces = force_n.iter().flatten().zip(self.found.iter().flatten());
-        for ((force, found), residual) in forces.zip(self.residual.iter_mut().flatten()) {
-            let now = found - force;
-            let by = now - *residual;
-            change += now.abs();
-            size += found.abs();
-            was += force.abs();
-            along += now * by;
-            square += by * by;
-            *residual = now;
+        for (i, force) in force_n.iter().enumerate() {
+            let (found, residual) = (&self.found[i], &mut self.residual[i]);
+            for vertex in self.active.iter().map(|vertex| *vertex as usize) {
+                let now = found[vertex] - force[vertex];
+                let by = now - residual[vertex];
+                change += now.abs();
+                size += found[vertex].abs();
+                was += force[vertex].abs();
+                along += now * by;
+                square += by * by;
+                residual[vertex] = now;
+            }
         }
         if size == 0.0 && was > 0.0 {
             // Skin was pushed out of all reach: half as far, and from there anew.
@@ -151,17 +194,21 @@ impl Turns {
             0 => (0.0, 1.0 - FIRST),
             rounds => (share.clamp(-SHARE_MAX, SHARE_MAX), if rounds < LATE { 1.0 } else { late }),
         };
-        let both = self.from.iter_mut().flatten().zip(self.before.iter_mut().flatten());
-        let found = self.found.iter().flatten();
-        for ((force, found), (from, before)) in force_n.iter_mut().flatten().zip(found).zip(both) {
-            if self.rounds == 0 {
-                // What ran away in another frame is of no account here.
-                (*from, *before) = (*force, *found);
+        let is_first = self.rounds == 0;
+        for (i, force) in force_n.iter_mut().enumerate() {
+            let (found, from, before) = (&self.found[i], &mut self.from[i], &mut self.before[i]);
+            for vertex in self.active.iter().map(|vertex| *vertex as usize) {
+                let (force, found) = (&mut force[vertex], found[vertex]);
+                let (from, before) = (&mut from[vertex], &mut before[vertex]);
+                if is_first {
+                    // What ran away in another frame is of no account here.
+                    (*from, *before) = (*force, found);
+                }
+                let start = *force + share * (*from - *force);
+                let end = found + share * (*before - found);
+                (*from, *before) = (*force, found);
+                *force = start + taken * (end - start);
             }
-            let start = *force + share * (*from - *force);
-            let end = found + share * (*before - found);
-            (*from, *before) = (*force, *found);
-            *force = start + taken * (end - start);
         }
         self.rounds += 1;
         change

@@ -1,6 +1,6 @@
 //! Moves objects that have jumped deep into the skin in by steps.
 
-use super::{BACK_MAX_MM, ITERATIONS_ON_THE_WAY, SETTLED_MM, STEP_MM, STEPS_MAX, Solver};
+use super::{BACK_MAX_MM, STEP_MM, STEPS_MAX, Solver, Until};
 use crate::answer::Effort;
 use crate::objects::View;
 use crate::patch::Patch;
@@ -34,7 +34,7 @@ impl Solver {
             if view.is_spent(effort) {
                 break;
             }
-            self.iterate(held(left), ITERATIONS_ON_THE_WAY, SETTLED_MM, effort);
+            self.iterate(held(left), Until::ON_THE_WAY, effort);
         }
     }
 

@@ -3,7 +3,7 @@
 
 use super::{
     FORCE_MIN_N, FRAME_PRODUCTS_MAX, NEAR_MM, PRODUCTS_MAX, PRODUCTS_MIN, RELAXATION, SHARE,
-    Solver, TURN_MAX, VIOLATION_MM,
+    Solver, TURN_MAX, Until, VIOLATION_MM,
 };
 use crate::answer::Effort;
 use crate::bounded::Symmetric;
@@ -15,8 +15,7 @@ impl Solver {
     pub(super) fn iterate(
         &mut self,
         view: View<'_>,
-        iterations_max: u32,
-        settled_mm: f32,
+        Until { settled_mm, iterations_max }: Until,
         effort: &mut Effort,
     ) -> f32 {
         let (mut relaxation, mut change) = (1.0f32, f32::INFINITY);

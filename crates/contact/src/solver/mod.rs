@@ -85,6 +85,27 @@ pub struct Settings {
     pub friction: bool,
 }
 
+/// When the linearisations of a frame's step end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Until {
+    /// Change of displacement, reference mm.
+    pub(crate) settled_mm: f32,
+    pub(crate) iterations_max: u32,
+}
+
+impl Until {
+    /// Of an answer.
+    pub(crate) const SETTLED: Self =
+        Self { settled_mm: SETTLED_MM, iterations_max: ITERATIONS_MAX };
+    /// Of a step on the way.
+    const ON_THE_WAY: Self = Self { settled_mm: SETTLED_MM, iterations_max: ITERATIONS_ON_THE_WAY };
+
+    /// The same with displacements that may still change by so much.
+    pub(crate) const fn within(settled_mm: f32) -> Self {
+        Self { settled_mm, ..Self::SETTLED }
+    }
+}
+
 /// Where a net force was met; the next frame starts there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reached {
@@ -321,22 +342,22 @@ impl Solver {
     /// Finds what presses on the finger in `view`. A warm frame that runs away is tried once more
     /// from nothing.
     pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) -> Result<(), ContactError> {
-        self.frame_until(SETTLED_MM, view, out)
+        self.frame_until(Until::SETTLED, view, out)
     }
 
-    /// The same, until displacements change by no more than `settled_mm` (reference mm).
+    /// The same, until displacements change by so little, or so often.
     pub(crate) fn frame_until(
         &mut self,
-        settled_mm: f32,
+        until: Until,
         view: View<'_>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
         let mut sides = std::mem::take(&mut self.sides);
-        let mut is_found = self.attempt(settled_mm, view, &mut sides, out);
+        let mut is_found = self.attempt(until, view, &mut sides, out);
         if !is_found {
             self.forget_start();
             let first = out.effort;
-            is_found = self.attempt(settled_mm, view.after(&first), &mut sides, out);
+            is_found = self.attempt(until, view.after(&first), &mut sides, out);
             out.effort = first.plus(out.effort);
         }
         self.sides = sides;
@@ -365,7 +386,7 @@ impl Solver {
     /// Whether what came out is finite.
     fn attempt(
         &mut self,
-        settled_mm: f32,
+        until: Until,
         view: View<'_>,
         sides: &mut Sides,
         out: &mut Contact,
@@ -379,13 +400,13 @@ impl Solver {
         let seen = Seen { candidates: &self.candidates, is_far };
         sides.judge(&self.model, view, seen, &mut out.effort);
         if !sides.any_held() {
-            let is_finite = self.press(settled_mm, view, false, out);
+            let is_finite = self.press(until, view, false, out);
             out.quality.out_of_range |= sides.is_beyond();
             return is_finite;
         }
         let view = sides.view(view);
         self.find_candidates(view, &mut out.effort);
-        let is_finite = self.press(settled_mm, view, true, out);
+        let is_finite = self.press(until, view, true, out);
         out.quality.is_held = true;
         out.quality.out_of_range |= sides.is_beyond();
         if !(out.force_n.iter().any(|f| *f != 0.0)) {
@@ -399,7 +420,7 @@ impl Solver {
     }
 
     /// Presses the candidates; returns whether what came out is finite.
-    fn press(&mut self, settled_mm: f32, view: View<'_>, is_held: bool, out: &mut Contact) -> bool {
+    fn press(&mut self, until: Until, view: View<'_>, is_held: bool, out: &mut Contact) -> bool {
         // Where no undeformed vertex lies in a thing, no force is an answer; a warm start could find
         // another one, on the far side of something thin.
         if self.candidates.iter().all(|(free, _)| *free > 0.0) {
@@ -414,7 +435,7 @@ impl Solver {
         self.keep_candidates();
         self.displace(self.patch.vertices().len());
         self.approach(view, &mut out.effort);
-        let change = self.iterate(view, ITERATIONS_MAX, settled_mm, &mut out.effort);
+        let change = self.iterate(view, until, &mut out.effort);
         if !change.is_finite() {
             return false;
         }

@@ -52,9 +52,10 @@ impl Window {
         pressure: &mut [f32],
     ) {
         let [x, y, z] = force_n;
-        for (vertex, pressure) in self.hat_mpa.iter_mut().enumerate() {
+        // Corners of the pixels' triangles are among these.
+        for vertex in self.ids.iter().map(|id| *id as usize) {
             let square = x[vertex].powi(2) + y[vertex].powi(2) + z[vertex].powi(2);
-            *pressure = square.sqrt() / self.hat_mm2[vertex].max(1e-3);
+            self.hat_mpa[vertex] = square.sqrt() / self.hat_mm2[vertex].max(1e-3);
         }
         for (slot, entry) in self.entries.iter().enumerate() {
             let pixel = &skin.raster.pixels()[*entry as usize];

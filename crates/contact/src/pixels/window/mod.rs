@@ -52,10 +52,12 @@ pub(super) struct Window {
     step_px: usize,
     solved_for: Vec<u64>,
     shares: Vec<f32>,
+    /// Pixels, as bits, all of whose shares lie on the skin.
+    is_inner: Vec<u64>,
     /// Pixels, as bits, that are looked at.
     looked_at: Vec<u64>,
     /// Vertices of the pixels' stencils, and where each stands among them.
-    ids: Vec<u32>,
+    pub ids: Vec<u32>,
     place: Vec<u32>,
     linear: [Vec<f32>; 3],
     moved: [Vec<f32>; 3],
@@ -83,7 +85,7 @@ impl Window {
         }
         let zeros = || vec![0.0f32; vertices];
         let vector = || std::array::from_fn(|_| zeros());
-        Self {
+        let mut window = Self {
             entries: Vec::with_capacity(pixels),
             held: Vec::with_capacity(pixels),
             cells: Vec::with_capacity(pixels),
@@ -105,6 +107,7 @@ impl Window {
             step_px: spacing.px(),
             solved_for,
             shares: spacing.shares(),
+            is_inner: vec![0; pixels.div_ceil(64)],
             looked_at: vec![0; pixels.div_ceil(64)],
             ids: Vec::with_capacity(vertices),
             place: vec![NONE; vertices],
@@ -119,7 +122,9 @@ impl Window {
             hat_n: zeros(),
             push: Push::new(model),
             moving: Vec::with_capacity(vertices),
-        }
+        };
+        window.note_inner(skin);
+        window
     }
 
     pub(super) fn len(&self) -> usize {
@@ -203,9 +208,28 @@ impl Window {
         sums.map(|sum| (sum / count).max(1e-3))
     }
 
-    /// Adds the pressure of a pixel, and of its image, to the means over pixels of pressure that is
-    /// a cubic between those that are solved for.
-    pub(super) fn spread(&self, skin: &PixelSkin, index: usize, pressure: f32, map: &mut [f32]) {
+    /// How far from a pixel, in the map's order, its pressure or its image's shows at most.
+    pub(super) fn reach(&self) -> usize {
+        // An image that shows stands within as many rows as a pixel has shares.
+        (2 * self.shares.len()) * MAP_SIDE_PX
+    }
+
+    /// Adds the pressure of a pixel of the window, and of its image, to the means over pixels of pressure
+    /// that is a cubic between those that are solved for.
+    pub(super) fn spread(&self, skin: &PixelSkin, slot: usize, pressure: f32, map: &mut [f32]) {
+        let entry = self.entries[slot] as usize;
+        let index = skin.raster.indices()[entry] as usize;
+        if self.is_inner[entry / 64] >> (entry % 64) & 1 == 1 {
+            let side = self.shares.len();
+            let first = index - (side / 2) * (MAP_SIDE_PX + 1);
+            for (row, a) in self.shares.iter().enumerate() {
+                let to = &mut map[first + row * MAP_SIDE_PX..][..side];
+                for (to, b) in to.iter_mut().zip(&self.shares) {
+                    *to += a * b * pressure;
+                }
+            }
+            return;
+        }
         let image = self.image_row(skin, index).map(|row| row * self.step_px);
         let near = image.filter(|row| *row < index / MAP_SIDE_PX + self.shares.len());
         let Some(row) = near else {
@@ -215,6 +239,24 @@ impl Window {
         // Over the mirror it leaves, and the image's enters.
         self.share(skin, index, None, pressure, map);
         self.share(skin, row * MAP_SIDE_PX + index % MAP_SIDE_PX, None, pressure, map);
+    }
+
+    /// Notes pixels all of whose shares lie on the skin, and whose image, if they have one, is far.
+    fn note_inner(&mut self, skin: &PixelSkin) {
+        let (mask, side) = (skin.raster.mask(), self.shares.len());
+        let around = (side / 2) * (MAP_SIDE_PX + 1);
+        for (entry, index) in skin.raster.indices().iter().enumerate() {
+            let index = *index as usize;
+            let image = self.image_row(skin, index).map(|row| row * self.step_px);
+            let is_far = image.is_none_or(|row| row >= index / MAP_SIDE_PX + side);
+            let is_on_skin = |row: usize| {
+                let first = (index + row * MAP_SIDE_PX).checked_sub(around);
+                let row = first.and_then(|first| mask.get(first..first + side));
+                row.is_some_and(|row| row.iter().all(|on| *on))
+            };
+            let is_inner = is_far && (0..side).all(is_on_skin);
+            self.is_inner[entry / 64] |= u64::from(is_inner) << (entry % 64);
+        }
     }
 
     /// Adds what a pixel at `index`, which may lie beyond the map, gives to those round it.
