@@ -20,12 +20,13 @@ use tokio::{
 
 use crate::{core::digest::sha256_hex, problem};
 
-/// An answer as it is made.
+/// An answer before it is compressed and hashed.
 #[derive(Debug)]
 pub(crate) struct Content {
     pub(crate) content_type: &'static str,
     pub(crate) bytes: Bytes,
-    /// Greatest value of a map that is a picture, and the header that says it.
+    /// For a map drawn as a picture: the name of the header that states the value of white, and
+    /// that value.
     pub(crate) white: Option<(&'static str, f32)>,
     /// Whether the client's `Accept` has chosen this form among others.
     pub(crate) is_negotiated: bool,
@@ -41,16 +42,16 @@ impl Content {
 #[derive(Debug)]
 pub(crate) struct Cached {
     pub(crate) content: Content,
-    /// Compressed, if that is shorter.
+    /// The bytes compressed by gzip; None if that is no shorter.
     pub(crate) gzip: Option<Bytes>,
-    /// SHA-256 of the bytes, in hexadecimal digits.
+    /// SHA-256 of the uncompressed bytes, in hexadecimal digits.
     pub(crate) tag: String,
 }
 
 /// The answers that were asked for so far, by key.
 pub(crate) struct Cache<K> {
     cells: Mutex<HashMap<K, Arc<OnceCell<Arc<Cached>>>>>,
-    /// One at a time: the processors are there for maps.
+    /// One answer is made at a time, to leave the processors to frames.
     turn: Semaphore,
 }
 
@@ -61,10 +62,10 @@ impl<K> Default for Cache<K> {
 }
 
 impl<K: Eq + Hash> Cache<K> {
-    /// The answer of this key; `make` is called if nobody has asked before.
+    /// The answer for this key. `make` is called if it is not cached yet.
     ///
     /// # Errors
-    /// Those of `make`; the next one who asks has it made anew.
+    /// Those of `make`. An error is not cached: the next request calls its `make`.
     pub(crate) async fn get(
         &self,
         key: K,

@@ -9,26 +9,28 @@ use std::{
 use papilla_engine::ladder::Percentiles;
 use papilla_proto::MAP_SIDE_PX;
 
-/// What decoding, encoding and handing over add where no calibration has measured it, us.
+/// What decoding, encoding and handing over add to an inference, us, until a calibration has
+/// measured it.
 const OVERHEAD_US: u64 = 500;
 
-/// Runs whose median is the typical time of a tier: eight slow ones move it.
+/// Number of last runs whose median is the typical time of a tier: eight slow runs change it.
 const WINDOW: usize = 16;
-/// Of so many frames in a row that are expected to be late one is rendered all the same.
+/// Of this many frames in a row that are expected to be late, one is rendered all the same.
 const PROBE_EVERY: u32 = 16;
 
 /// How long the inference of a tier takes on this machine.
 #[derive(Debug)]
 pub(crate) struct Latency {
     fastest_us: AtomicU64,
-    /// The shipped time; 0: none.
+    /// The time stated in the card or ladder that came with the model; 0: none.
     expected_us: AtomicU64,
-    /// The last runs; what was expected or calibrated stands where there were fewer.
+    /// Times of the last runs. Until there are enough, the other places hold the expected or
+    /// calibrated time.
     window_us: [AtomicU64; WINDOW],
     runs: AtomicUsize,
-    /// Runs at the last look of [`is_idle`](Self::is_idle).
+    /// `runs` at the last call of [`is_idle`](Self::is_idle).
     runs_seen: AtomicUsize,
-    /// Frames that were expected to be late since the last run.
+    /// Number of frames since the last run that were expected to be late.
     expected_late: AtomicU32,
     calibrated_us: OnceLock<Percentiles>,
 }
@@ -48,13 +50,13 @@ impl Default for Latency {
 }
 
 impl Latency {
-    /// What to expect before any run: the shipped time.
+    /// Sets the time that is expected before any run: the shipped one.
     pub(crate) fn expect(&self, time: Duration) {
         self.expected_us.store(us(time), Ordering::Relaxed);
         self.fill(us(time));
     }
 
-    /// The shipped time, us; without one the typical.
+    /// The shipped time, us; if there is none, the typical time.
     pub(crate) fn expected_us(&self) -> u64 {
         match self.expected_us.load(Ordering::Relaxed) {
             0 => self.typical_us().max(1),
@@ -62,17 +64,17 @@ impl Latency {
         }
     }
 
-    /// How much slower than shipped it is now.
+    /// Typical time over shipped time.
     pub(crate) fn slowdown(&self) -> f64 {
         self.typical_us() as f64 / self.expected_us() as f64
     }
 
-    /// The fastest run here, us; none before the first.
+    /// The fastest run on this machine, us; None before the first run.
     pub(crate) fn fastest_us(&self) -> Option<u64> {
         Some(self.fastest_us.load(Ordering::Relaxed)).filter(|&us| us < u64::MAX)
     }
 
-    /// Whether a run on this machine is known.
+    /// Whether at least one run on this machine has been timed.
     pub(crate) fn is_measured(&self) -> bool {
         self.fastest_us().is_some()
     }
@@ -93,8 +95,8 @@ impl Latency {
             self.calibrated_us.set(Percentiles { p50: us(middle) as f64, p99: us(*high) as f64 });
     }
 
-    /// Takes the times of a second look, if they are shorter: a machine may be busier than it was,
-    /// but no tier is faster than it can be.
+    /// Takes the times of a later measurement if they are shorter. Longer ones say only that the
+    /// machine is busier now; a shorter one shows that the tier can be that fast.
     pub(crate) fn correct(&self, times: &mut [Duration]) {
         times.sort_unstable();
         let (Some(first), Some(middle)) = (times.first(), times.get(times.len() / 2)) else {
@@ -106,23 +108,23 @@ impl Latency {
         }
     }
 
-    /// Whether no frame has been measured since this was last asked.
+    /// Whether no frame has been timed since the last call.
     pub(crate) fn is_idle(&self) -> bool {
         let runs = self.runs.load(Ordering::Relaxed);
         self.runs_seen.swap(runs, Ordering::Relaxed) == runs
     }
 
-    /// Whether it seems half as slow again as it has been.
+    /// Whether the typical time is more than one and a half times the fastest run.
     pub(crate) fn has_been_faster(&self) -> bool {
         self.fastest_us().is_some_and(|us| self.typical_us() > us + us / 2)
     }
 
-    /// Whether a frame has been measured.
+    /// Whether any frame has been timed.
     pub(crate) fn is_used(&self) -> bool {
         self.runs.load(Ordering::Relaxed) > 0
     }
 
-    /// Takes note of one run.
+    /// Records the time of a frame's inference.
     pub(crate) fn learn(&self, time: Duration) {
         let us = us(time);
         self.fastest_us.fetch_min(us, Ordering::Relaxed);
@@ -131,11 +133,13 @@ impl Latency {
         self.expected_late.store(0, Ordering::Relaxed);
     }
 
-    /// Whether no run can be expected to end within `left`: it is less than half the fastest run,
-    /// so that one lucky run on an idle machine does not condemn a frame that could be in time.
+    /// Whether a frame with `left` until its deadline should be dropped, since no run can be
+    /// expected to end in time: `left` is at most half of the fastest run. The half is there so
+    /// that one lucky run on an idle machine does not condemn frames that could be in time.
     ///
-    /// Now and then the answer is no all the same: a tier whose frames are all dropped would never
-    /// be measured again, and a time that was taken on a busy machine would stand for good.
+    /// One frame in [`PROBE_EVERY`] is let through all the same. Otherwise a tier whose frames are
+    /// all dropped would never be timed again, and a time taken on a busy machine would stand for
+    /// good.
     pub(crate) fn will_miss(&self, left: Duration) -> bool {
         if left.is_zero() {
             return true;
@@ -157,7 +161,7 @@ impl Latency {
         *window.select_nth_unstable(WINDOW / 2).1
     }
 
-    /// What the calibration found, us; none if there was none.
+    /// The percentiles that the calibration found, us; None if the tier was not calibrated.
     pub(crate) fn calibrated_us(&self) -> Option<Percentiles> {
         self.calibrated_us.get().copied()
     }
@@ -183,14 +187,14 @@ impl Overhead {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Takes what a calibration has found.
+    /// Sets what a calibration has measured.
     pub(crate) fn set_us(&self, us: u64) {
         self.0.store(us, Ordering::Relaxed);
     }
 }
 
-/// The map that everything is timed on: a round contact with half of the pressure that a tier was
-/// trained for.
+/// Fills in the map that tiers and effects are timed on: a round contact whose peak is half of the
+/// greatest pressure of the training.
 pub(crate) fn probe_map(pressure_max_pa: f32, pressure_pa: &mut [f32]) {
     let half = MAP_SIDE_PX as f32 / 2.0;
     for (i, pressure_pa) in pressure_pa.iter_mut().enumerate() {

@@ -6,15 +6,15 @@ use bytes::BytesMut;
 
 pub(crate) use self::store::{Frames, Store};
 
-/// Bytes kept free before an answer for the heads of its transport. A multiple of 16: sections
-/// begin at such.
+/// Free bytes at the start of a session's answer, into which its transport writes the header of the
+/// WebSocket frame. A multiple of 16, so that the sections behind it are aligned.
 pub(crate) const HEADROOM: usize = 16;
 
-/// Buffers in turn. Three are enough for answers: one may still be on its way out, one behind it,
-/// while the next is filled.
+/// A ring of `N` reusable buffers. Answers need three: one is being written to the socket, one
+/// waits behind it, and the next is filled.
 ///
-/// A buffer is handed out by splitting it off; when whoever sent it lets go,
-/// the memory can be claimed again.
+/// A buffer is handed out by splitting it off. Its memory can be claimed again once the receiver
+/// has dropped what it got.
 #[derive(Debug)]
 pub(crate) struct Recycler<const N: usize = 3> {
     buffers: [BytesMut; N],
@@ -28,25 +28,25 @@ impl<const N: usize> Default for Recycler<N> {
 }
 
 impl<const N: usize> Recycler<N> {
-    /// Sees to it that all buffers that nobody holds have room for `bytes`, so that no claim of as
-    /// much needs memory later.
+    /// Gives every buffer that nobody holds room for `bytes`, so that later claims of at most that
+    /// size do not allocate.
     pub(crate) fn make_room(&mut self, bytes: usize) {
         for buffer in &mut self.buffers {
             if !buffer.try_reclaim(bytes) {
                 *buffer = BytesMut::with_capacity(bytes);
-                // Splitting makes the count of owners, which takes memory too.
+                // The first split allocates the reference count; this does it now.
                 drop(buffer.split());
             }
         }
     }
 
-    /// Whether there is memory here that nobody holds.
+    /// Whether a buffer that nobody holds has any capacity.
     pub(crate) fn has_room(&mut self) -> bool {
         self.buffers.iter_mut().any(|buffer| buffer.try_reclaim(1))
     }
 
-    /// An empty buffer with room for `bytes`; memory is taken from the system only if
-    /// no buffer of an earlier answer is back and large enough.
+    /// An empty buffer with room for `bytes`. It allocates only if no buffer is both returned and
+    /// large enough.
     pub(crate) fn claim(&mut self, bytes: usize) -> &mut BytesMut {
         for turn in 0..N {
             let index = (self.next + turn) % N;
@@ -63,7 +63,8 @@ impl<const N: usize> Recycler<N> {
         buffer
     }
 
-    /// [`claim`](Self::claim)s a buffer and gives it away; letting go of it brings it back.
+    /// [`claim`](Self::claim)s a buffer and hands it out. It returns to the ring when it is
+    /// dropped.
     pub(crate) fn lend(&mut self, bytes: usize) -> BytesMut {
         self.claim(bytes).split_off(0)
     }

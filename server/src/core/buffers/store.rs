@@ -13,23 +13,22 @@ use papilla_proto::{HEADER_LEN, MAP_LEN};
 
 use super::{HEADROOM, Recycler};
 
-/// Buffers of frames: one that is read into, one with a thread, one in the slot, one that gives
-/// way to it.
+/// Buffers of incoming frames. Four: one is read into, one is with an inference thread, one waits
+/// in the slot, and one was just replaced there.
 pub(crate) type Frames = Recycler<4>;
 
 /// Buffers of answers.
 pub(crate) type Answers = Recycler;
 
-/// Room of every buffer, bytes: that of a whole float32 map with the heads around it, so that any
-/// session can use it.
-/// What a session does not touch the system does not provide.
+/// Capacity of every buffer, bytes: a whole float32 map with its headers, so that any session can
+/// use any buffer. Pages that a session never touches take no physical memory.
 const ROOM: usize = 2 * HEADROOM + HEADER_LEN + 4 * MAP_LEN;
 
 /// The buffers that nobody uses.
 #[derive(Debug)]
 pub(crate) struct Store {
     kept: Mutex<Kept>,
-    /// Most of each kind: one for every session there may be.
+    /// The most of each kind that are kept: one for each session that may be open.
     places: usize,
 }
 
@@ -64,19 +63,19 @@ impl Store {
         answers
     }
 
-    /// Takes buffers back.
+    /// Takes the buffers of a closed session back.
     pub(crate) fn keep_frames(&self, frames: &mut Frames) {
         keep(&mut self.kept().frames, frames, self.places);
     }
 
-    /// Takes buffers back.
+    /// Takes the buffers of a closed session back.
     pub(crate) fn keep_answers(&self, answers: &mut Answers) {
         keep(&mut self.kept().answers, answers, self.places);
     }
 }
 
 fn keep<const N: usize>(kept: &mut Vec<Recycler<N>>, back: &mut Recycler<N>, places: usize) {
-    // Buffers that never had room are those of a session that came to nothing.
+    // Buffers without capacity come from a session that failed before it used them.
     if back.has_room() && kept.len() < places {
         kept.push(mem::take(back));
     }

@@ -20,19 +20,19 @@ use std::{
 
 use tokio::sync::oneshot;
 
-/// Pieces of work that may wait, in all and of one client.
+/// Pieces of work that may wait, of all clients together and of one client.
 const WAITING_MAX: usize = 128;
 const OF_CLIENT_MAX: usize = 32;
 
 /// Longest wait of a thread for work; every wait is timed.
 const WAIT: Duration = Duration::from_millis(500);
 
-/// Whether anybody still waits for a piece of work.
+/// A flag that tells a piece of work that nobody waits for its result any more.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Whether the work is for nothing.
+    /// Whether the result is no longer wanted.
     pub(crate) fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -45,9 +45,9 @@ impl Cancel {
 /// Why there is no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NoResult {
-    /// Too much waits already.
+    /// Too many pieces of work wait already.
     Busy,
-    /// The work panicked, or the service ends.
+    /// The work panicked, or the desk was closed.
     Broken,
 }
 
@@ -59,15 +59,15 @@ pub(crate) struct Desk<K> {
 struct Shared<K> {
     state: Mutex<State<K>>,
     arrival: Condvar,
-    /// Pieces of work of one client that may be under way.
+    /// The most pieces of work of one client that may run at a time.
     of_client_max: usize,
 }
 
 struct State<K> {
-    /// Those that have work, waiting or under way.
+    /// The clients that have work, waiting or running.
     clients: Vec<Client<K>>,
     waiting: usize,
-    /// Numbers of pieces of work, and of turns.
+    /// The last number given to a piece of work or to a turn.
     count: u64,
     closed: bool,
 }
@@ -76,7 +76,7 @@ struct Client<K> {
     key: K,
     running: usize,
     waiting: VecDeque<Piece>,
-    /// When it last had a turn.
+    /// The number of its last turn; 0 before the first.
     turn: u64,
 }
 
@@ -87,10 +87,10 @@ struct Piece {
 }
 
 impl<K: Clone + PartialEq + Send + 'static> Desk<K> {
-    /// Starts the threads; each calls `begin` first.
+    /// Starts the threads. Each calls `begin` before it serves.
     ///
     /// # Errors
-    /// The system starts no more threads.
+    /// The system cannot start a thread.
     pub(crate) fn start(
         threads: usize,
         begin: impl Fn() + Clone + Send + 'static,
@@ -108,11 +108,12 @@ impl<K: Clone + PartialEq + Send + 'static> Desk<K> {
         Ok(desk)
     }
 
-    /// Does a piece of work for a client. Dropped, it is taken back if it has not begun, and
-    /// cancelled if it has.
+    /// Does a piece of work for a client. If this future is dropped, work that has not begun is
+    /// removed, and work that has begun is told by its [`Cancel`].
     ///
     /// # Errors
-    /// Too much waits already; the work panicked.
+    /// [`NoResult::Busy`] if too much waits already, [`NoResult::Broken`] if the work panicked or
+    /// the desk was closed.
     pub(crate) async fn work<T: Send + 'static>(
         &self,
         client: K,
@@ -120,7 +121,7 @@ impl<K: Clone + PartialEq + Send + 'static> Desk<K> {
     ) -> Result<T, NoResult> {
         let (result, waiting) = oneshot::channel();
         let work = Box::new(move |cancel: &Cancel| {
-            // Err: nobody waits for it any more.
+            // Fails if nobody waits for the result any more.
             let _ = result.send(work(cancel));
         });
         let _asked = self.shared.enter(client, work).ok_or(NoResult::Busy)?;
@@ -138,7 +139,7 @@ impl<K> Drop for Desk<K> {
     }
 }
 
-/// Takes the work back when it is dropped.
+/// Cancels the work when it is dropped, and removes it if it has not begun.
 struct Asked<K> {
     shared: Arc<Shared<K>>,
     number: u64,
@@ -157,7 +158,7 @@ impl<K> Drop for Asked<K> {
         state.waiting -= usize::from(taken_back.is_some());
         state.clients.retain(Client::has_work);
         drop(state);
-        // What it holds may be large, and is freed without the lock.
+        // The closure may hold much memory, so it is freed without the lock.
         drop(taken_back);
     }
 }
@@ -178,12 +179,13 @@ impl<K> Shared<K> {
 impl<K: Clone + PartialEq> Shared<K> {
     fn new(threads: usize) -> Self {
         let state = State { clients: Vec::new(), waiting: 0, count: 0, closed: false };
-        // A client never has all threads, so that another's first hello need not wait for its work.
+        // With two threads or more a client never has all of them, so that another client's first
+        // hello need not wait for its work.
         let of_client_max = threads.saturating_sub(1).max(1);
         Self { state: Mutex::new(state), arrival: Condvar::new(), of_client_max }
     }
 
-    /// Takes a piece in; none: too much waits.
+    /// Queues a piece of work. None: too much waits, or the desk is closed.
     fn enter(self: &Arc<Self>, key: K, work: Box<dyn FnOnce(&Cancel) + Send>) -> Option<Asked<K>> {
         let mut state = self.state();
         state.count += 1;
@@ -207,7 +209,7 @@ impl<K: Clone + PartialEq> Shared<K> {
         Some(Asked { shared: Arc::clone(self), number, cancel })
     }
 
-    /// The next piece of the client whose last turn is the longest ago.
+    /// The next piece of work of the client whose last turn was longest ago.
     fn next(&self, state: &mut State<K>) -> Option<(K, Piece)> {
         let may = |client: &&mut Client<K>| {
             client.running < self.of_client_max && !client.waiting.is_empty()
@@ -221,7 +223,7 @@ impl<K: Clone + PartialEq> Shared<K> {
         Some((client.key.clone(), piece))
     }
 
-    /// The client has a thread less; one without work is forgotten.
+    /// Notes that a piece of work of this client has ended. A client without work is forgotten.
     fn end(&self, key: &K) {
         let mut state = self.state();
         if let Some(client) = state.clients.iter_mut().find(|client| client.key == *key) {
@@ -230,7 +232,7 @@ impl<K: Clone + PartialEq> Shared<K> {
         state.clients.retain(Client::has_work);
     }
 
-    /// Works until the desk is closed.
+    /// What each thread runs: it does work until the desk is closed.
     fn serve(&self) {
         loop {
             let mut state = self.state();

@@ -35,12 +35,14 @@ pub(crate) enum BundleError {
 }
 
 impl Bundle {
-    /// Reads the folder of the finger called `name`, which will have `place`; None: it was to stop.
-    /// What `running` has already is not loaded again. `default` is the finger whose networks it may
-    /// borrow.
+    /// Reads and checks the folder of the finger called `name`, which gets the place `place`.
+    /// Models that `running` has loaded already are shared with it and not loaded again. `default`
+    /// is the finger whose networks this one may borrow. None: `is_to_stop` was true before the
+    /// folder was read.
     ///
     /// # Errors
-    /// A file is missing, unreadable or at odds with another, or a network answers wrongly.
+    /// A file is missing or unreadable, two files contradict each other, or a network fails its
+    /// golden answers.
     pub(crate) fn read(
         folder: &Path,
         (name, place): (&str, usize),
@@ -54,7 +56,8 @@ impl Bundle {
             let (file, origin) = (file.to_owned(), assets.origin.clone());
             StartError::Unusable { file, origin, reason }
         };
-        // What it is made of is for the programs that simulate; without it the folder is no finger's.
+        // Only the simulation programs need the finger's description, but a folder without one is
+        // no finger.
         assets.require(FINGER)?;
         let lender = Similar { name: DEFAULT_FINGER, atlas: &default.atlas };
         let before = running.map(|running| &*running.catalogue);

@@ -23,7 +23,7 @@ use crate::{
 
 /// Longest name of a finger, bytes.
 const NAME_MAX: usize = 64;
-/// Names of fingers in a message.
+/// The most names of fingers that an error message lists.
 const NAMES_TOLD_MAX: usize = 20;
 
 /// A finger as it is served at one moment.
@@ -38,18 +38,19 @@ pub(crate) struct Loaded {
 #[derive(Clone)]
 pub(crate) struct Named {
     pub(crate) loaded: Loaded,
-    /// What it takes.
+    /// The memory that it takes.
     pub(crate) memory: Memory,
-    /// A reload found its folder gone: sessions that have it go on, nobody else gets it.
+    /// A reload found its folder gone. Open sessions go on with it, and new ones cannot name it.
     pub(crate) retired: bool,
 }
 
-/// What a finger takes.
+/// The memory that a finger takes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Memory {
-    /// Bytes of its files that were read.
+    /// Size of the files that were read, bytes.
     pub(crate) files_bytes: u64,
-    /// By so much the process grew as it was loaded; none where the system does not tell.
+    /// Growth of the process' resident memory while it was loaded, bytes; None if the system does
+    /// not tell.
     pub(crate) grown_bytes: Option<u64>,
 }
 
@@ -86,7 +87,8 @@ impl From<FingerError> for Problem {
     }
 }
 
-/// Whether a folder of this name can be a finger: it never leads out of the folder of fingers.
+/// Whether a finger can have this name. Such a name is one plain component of a path, so it never
+/// leads out of the folder of fingers.
 pub(crate) fn is_name(name: &str) -> bool {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_';
     (1..=NAME_MAX).contains(&name.len()) && name.bytes().all(is_plain) && name != DEFAULT_FINGER
@@ -95,14 +97,15 @@ pub(crate) fn is_name(name: &str) -> bool {
 /// The folder of the finger called `name`.
 ///
 /// # Errors
-/// There is none.
+/// The service has no folder of fingers, the folder cannot be read, or no finger in it has this
+/// name.
 pub(crate) fn folder(config: &Config, name: &str) -> Result<PathBuf, FingerError> {
     let told = || shortened(name);
     let Some(fingers) = &config.fingers else {
         return Err(FingerError::NoFolder { name: told() });
     };
     let folder = fingers.join(name);
-    // What is no name is not looked for.
+    // A string that is no valid name is never used as a path.
     if is_name(name) && folder.is_dir() {
         return Ok(folder);
     }
@@ -113,17 +116,17 @@ pub(crate) fn folder(config: &Config, name: &str) -> Result<PathBuf, FingerError
     Err(FingerError::Unknown { name: told(), known: known(&names(fingers).map_err(unreadable)?) })
 }
 
-/// The names of the fingers in a folder, without those that no client can name.
+/// The names of the fingers in a folder. Folders whose names a client cannot send are left out.
 ///
 /// # Errors
-/// It cannot be read.
+/// The folder cannot be read.
 pub(crate) fn names(fingers: &Path) -> Result<Vec<String>, StartError> {
     let mut names = Assets::fingers(fingers)?;
     names.retain(|name| is_name(name));
     Ok(names)
 }
 
-/// Names for a message, that of the default finger first.
+/// The list of names for an error message, the default finger first.
 fn known(names: &[String]) -> String {
     let told = names.iter().take(NAMES_TOLD_MAX).map(String::as_str);
     let rest = names.len().saturating_sub(NAMES_TOLD_MAX);

@@ -27,7 +27,8 @@ const DEBT_MAX: Duration = Duration::from_secs(1);
 /// Cost that is assumed for a frame until one has been measured.
 const FIRST_ESTIMATE: Duration = Duration::from_millis(1);
 
-/// The account that all fingers of a session share, or all posts of one client; `S` is what waits.
+/// The account that all fingers of a session share, or all HTTP requests of one client. `S` is the
+/// kind of slot that waits.
 pub(crate) struct Account<S>(Mutex<Ledger<S>>);
 
 impl<S> Default for Account<S> {
@@ -43,7 +44,7 @@ impl<S> Account<S> {
         Arc::new(Self(Mutex::new(ledger)))
     }
 
-    /// Only the queue asks, under its own lock, so that nobody waits here.
+    /// Only the queue calls this, while it holds its own lock, so nobody ever waits here.
     pub(super) fn ledger(&self) -> MutexGuard<'_, Ledger<S>> {
         // Every change leaves the ledger whole, so a poisoned lock is usable.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -55,23 +56,25 @@ impl<S> Account<S> {
 pub(super) enum Weight {
     /// Its frames have been short.
     Light,
-    /// They were long not long ago, or none has been measured yet.
+    /// Some were long within the last [`HEAVY_FOR`], or no short one has been measured yet.
     Heavy,
 }
 
 /// What an account holds.
 pub(super) struct Ledger<S> {
-    /// When its next turn is due, by the virtual clock of the queue: thread time that it was given.
+    /// When its next turn is due, on the virtual clock of the queue. The clock's unit is thread
+    /// time.
     pub(super) due: Duration,
     /// Slots with a job, the longest wait first.
     pub(super) waiting: VecDeque<Arc<S>>,
-    /// The heap that it is in, if any.
+    /// The heap that the account is in; None if it is in neither.
     pub(super) listed: Option<Weight>,
     running: usize,
-    /// What its next frame is taken to cost.
+    /// Estimated cost of its next frame, which is what the last measured one cost.
     estimate: Duration,
     has_been_short: bool,
-    /// Work beside the network, averaged over frames.
+    /// Moving average of a frame's processor time without the network; None before the first
+    /// measured frame.
     mean: Option<Duration>,
     heavy_until: Option<Instant>,
 }
@@ -97,8 +100,8 @@ impl<S> Ledger<S> {
         if is_heavy { Weight::Heavy } else { Weight::Light }
     }
 
-    /// Takes a slot in at a time of the virtual clock. A pause earns nothing, and not all debts
-    /// outlast it.
+    /// Queues a slot; `clock` is the virtual time now. An account that comes back after a pause has
+    /// no credit, and at most [`DEBT_MAX`] of debt.
     pub(super) fn enter(&mut self, slot: Arc<S>, clock: Duration) {
         if self.waiting.is_empty() && self.running == 0 {
             self.due = self.due.clamp(clock, clock + DEBT_MAX);
@@ -106,7 +109,8 @@ impl<S> Ledger<S> {
         self.waiting.push_back(slot);
     }
 
-    /// A thread takes the first slot; what its frame will cost is charged as far as one can tell.
+    /// Gives the first slot to a thread, and charges the account the estimated cost in advance.
+    /// Returns that charge too.
     pub(super) fn begin(&mut self) -> Option<(Arc<S>, Duration)> {
         let slot = self.waiting.pop_front()?;
         self.running += 1;
@@ -114,7 +118,7 @@ impl<S> Ledger<S> {
         Some((slot, self.estimate))
     }
 
-    /// A thread is done: what the frame cost takes the place of the estimate.
+    /// Ends a frame: what it really cost replaces the charge made in advance.
     pub(super) fn end(&mut self, charged: Duration, spent: Spent, now: Instant) {
         self.running = self.running.saturating_sub(1);
         self.due = self.due.saturating_sub(charged) + spent.busy;
@@ -137,6 +141,7 @@ impl<S> Ledger<S> {
 pub(super) struct Spent {
     /// Time that a thread was held.
     pub(super) busy: Duration,
-    /// The part of it that was not the network's; none: nothing was rendered.
+    /// Processor time of this frame without that of the network. None: the frame says nothing about
+    /// the account, since nothing was rendered and it did not take long.
     pub(super) beside_network: Option<Duration>,
 }

@@ -16,28 +16,29 @@ use crate::{
     core::catalogue::{Catalogue, Tier},
 };
 
-/// What a thread renders a tier with; nothing before the tier's first use.
+/// The engine session with which a thread runs a tier; None while the tier's model is not loaded.
 pub(crate) type TierSession = Option<Box<dyn Session>>;
 
-/// New sessions, each with its tier's place.
+/// New engine sessions, each with the place of its tier in the catalogue.
 pub(crate) type Sessions = Vec<(usize, TierSession)>;
 
-/// The next catalogue of a finger, and the sessions it takes beyond those of the last.
+/// A finger's new catalogue, and the sessions that are new with it.
 type Delivery = (Arc<Catalogue>, Sessions);
 
 /// What a thread renders a finger with.
 pub(super) struct OfFinger {
     pub(super) catalogue: Arc<Catalogue>,
-    /// One per tier, in the catalogue's order.
+    /// One for each tier, in the catalogue's order.
     pub(super) sessions: Vec<TierSession>,
 }
 
 /// What waits for one thread.
 #[derive(Default)]
 pub(crate) struct Inbox {
-    /// Looked at before every job, so that the lock need not be.
+    /// Whether anything waits. Read before every job, so that the lock is taken only if something
+    /// does.
     full: AtomicBool,
-    /// One a finger at most.
+    /// At most one for each finger: a later delivery is merged into the one that waits.
     deliveries: Mutex<Vec<Delivery>>,
 }
 
@@ -54,7 +55,7 @@ impl Inbox {
         self.full.store(true, Ordering::Release);
     }
 
-    /// Takes what waits; nearly free if there is nothing.
+    /// Takes all deliveries that wait. If there are none, it costs one atomic load.
     pub(super) fn collect(&self, fingers: &mut Vec<OfFinger>) {
         if !self.full.load(Ordering::Acquire) {
             return;
@@ -92,8 +93,8 @@ impl Exchange {
         Self { inboxes }
     }
 
-    /// Warm sessions of the tiers that are `fresh`, for every thread; of those that are not loaded,
-    /// their places.
+    /// Makes warm sessions of the tiers whose place is `fresh`, for every thread. A tier that is
+    /// not loaded gets its place with no session.
     ///
     /// # Errors
     /// A tier does not run.
@@ -108,7 +109,7 @@ impl Exchange {
         self.sessions(&fresh)
     }
 
-    /// The same of the tier at `place` alone, with this model.
+    /// Makes warm sessions of the one tier at `place` with this model, for every thread.
     ///
     /// # Errors
     /// The tier does not run.
@@ -121,7 +122,8 @@ impl Exchange {
         self.sessions(&[(place, &catalogue.tiers[place], Some(model))])
     }
 
-    /// Warm sessions of tiers with their models, if there are any, for every thread.
+    /// Makes warm sessions of these tiers for every thread. A tier without a model gets its place
+    /// with no session.
     fn sessions(
         &self,
         tiers: &[(usize, &Tier, Option<&dyn Model>)],

@@ -17,7 +17,7 @@ use papilla_session_effects::Effects;
 pub(crate) struct Job {
     /// Number of the tier.
     pub(crate) tier: usize,
-    /// The undecoded map: the payload alone, without a head of its transport.
+    /// The payload as it came in, not decoded and without the header of its frame.
     pub(crate) payload: Bytes,
     /// How to decode it.
     pub(crate) input: Input,
@@ -25,31 +25,31 @@ pub(crate) struct Job {
     pub(crate) output: Output,
     /// When the server had read the map.
     pub(crate) received: Instant,
-    /// When the answer is worthless.
+    /// After this the answer is worthless to the client. None: there is no deadline.
     pub(crate) deadline: Option<Instant>,
-    /// What is asked for beside the bare map.
+    /// What the client asked for beside the bare map.
     pub(crate) options: JobOptions,
 }
 
 /// What a job may ask for beside the bare map.
 #[derive(Debug, Default)]
 pub(crate) struct JobOptions {
-    /// Bytes to be left free before the answer.
+    /// Free bytes that the answer's buffer begins with.
     pub(crate) headroom: usize,
-    /// What becomes of pressure above what the tier was trained on.
+    /// What is done with pressure above that of the tier's training.
     pub(crate) out_of_range: OutOfRange,
-    /// The client's clock, us: effects that change with time go by it.
+    /// The client's time of this frame, us. Effects that change with time use it.
     pub(crate) time_us: u64,
-    /// The session's effects. Only the thread that renders the frame locks them, and a session
-    /// has one frame with a thread at a time.
+    /// The effects of the frame's finger. Only the thread that renders the frame locks them, and at
+    /// most one frame of a finger is being rendered.
     pub(crate) effects: Option<Arc<Mutex<Effects>>>,
-    /// The session's finger that the frame is of; locked as the effects are.
+    /// The finger that the frame belongs to. It is locked as the effects are.
     pub(crate) finger: Option<Arc<Mutex<Finger>>>,
-    /// Time that the contact is expected to take, us, if one is to be solved.
+    /// Expected time of the contact solver, us; None if no contact is to be solved.
     pub(crate) contact_us: Option<u64>,
-    /// Whether that is all: no network is asked.
+    /// Whether the contact is all that is asked for, so that no network runs.
     pub(crate) is_contact_alone: bool,
-    /// How the sink tells one answer from another; handed back as it is.
+    /// The frame's header, which the sink needs to answer it. The thread hands it back unchanged.
     pub(crate) header: Option<FrameHeader>,
 }
 
@@ -72,9 +72,9 @@ pub(crate) struct Times {
     pub(crate) queue: Duration,
     /// Decoding and checking.
     pub(crate) decode: Duration,
-    /// In the network; zero for a zero map.
+    /// Running the network; zero if it was not run, as for a map of zeros.
     pub(crate) infer: Duration,
-    /// The same by the processor's time.
+    /// The same in processor time.
     pub(crate) network: Duration,
     /// Encoding the answer.
     pub(crate) encode: Duration,
@@ -87,12 +87,12 @@ pub(crate) enum Outcome {
     Map {
         /// The encoded answer.
         bytes: BytesMut,
-        /// J/m3 per unit (u16, u8), J/m3 of full white (PNG), else 1.
+        /// J/m3 of one unit of the samples (u16, u8), J/m3 of full white (PNG), otherwise 1.
         scale: f32,
     },
-    /// The deadline had passed.
+    /// The deadline had passed, or would have been missed, at this stage.
     Late(Stage),
-    /// Something was wrong with the map, or with us.
+    /// The frame was invalid, or the service failed.
     Failed(Problem),
     /// The client was gone; nothing was rendered.
     Gone,
@@ -105,7 +105,7 @@ pub(crate) struct OutputMeta {
     pub(crate) window: Window,
     /// Bits of [`papilla_proto::flags`].
     pub(crate) flags: u8,
-    /// How wrong it is likely to be.
+    /// How wrong the answer is likely to be.
     pub(crate) errors: ErrorEstimate,
 }
 
@@ -120,11 +120,11 @@ impl Default for OutputMeta {
 pub(crate) struct Done {
     /// Number of the tier.
     pub(crate) tier: usize,
-    /// That of [`JobOptions`].
+    /// As in the [`JobOptions`].
     pub(crate) header: Option<FrameHeader>,
     /// When the server had read the map.
     pub(crate) received: Instant,
-    /// When the answer is worthless.
+    /// As in the [`Job`].
     pub(crate) deadline: Option<Instant>,
     /// Time by stage.
     pub(crate) times: Times,

@@ -33,14 +33,14 @@ use crate::{
 use job::Times;
 use slot::Offer;
 
-/// The threads and the queue before them.
+/// The inference threads and the queue that they take slots from.
 pub(crate) struct Pool {
     queue: Arc<Queue>,
     inboxes: Vec<Arc<Inbox>>,
     threads: Vec<JoinHandle<()>>,
 }
 
-/// The way into the pool.
+/// What connections use to put jobs into the pool.
 #[derive(Clone)]
 pub(crate) struct PoolHandle {
     queue: Arc<Queue>,
@@ -76,7 +76,7 @@ impl Pool {
                     Ok(mut worker) => {
                         priorities.enter(Role::Rendering);
                         let _ = report.send(Ok(()));
-                        // The starter counts reports until all senders are gone.
+                        // The starting thread reads reports until every sender has been dropped.
                         drop(report);
                         worker.run(&queue, &inbox);
                     }
@@ -103,7 +103,7 @@ impl Pool {
         PoolHandle { queue: Arc::clone(&self.queue), metrics: Arc::clone(metrics) }
     }
 
-    /// The way for new models into the threads.
+    /// What a reload uses to hand new models to the threads.
     pub(crate) fn exchange(&self) -> Exchange {
         Exchange::new(self.inboxes.clone())
     }
@@ -126,12 +126,13 @@ impl Drop for Pool {
 }
 
 impl PoolHandle {
-    /// Puts `job` into `slot` and sees to it that a thread comes for it.
+    /// Puts `job` into `slot`, and the slot into the queue unless it is there already.
     ///
-    /// Returns the job whose place it took, if that had not been started.
+    /// Returns the job that was replaced, if one waited in the slot and had not been started.
     ///
     /// # Errors
-    /// The job was not taken: the pool is closed or, against the bounds set at the start, full.
+    /// The job was not taken: the pool is closed, or full. It cannot be full as long as there are
+    /// no more slots than the pool was started for.
     pub(crate) fn submit(&self, slot: &Arc<Slot>, job: Job) -> Result<Option<Job>, NotTaken> {
         if !job.options.is_contact_alone {
             self.metrics.tier(job.tier).asked.fetch_add(1, Ordering::Relaxed);
@@ -153,7 +154,7 @@ impl PoolHandle {
     }
 }
 
-/// The pool took no job.
+/// The pool did not take the job.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct NotTaken;
 

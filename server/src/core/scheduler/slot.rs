@@ -10,22 +10,22 @@ use tokio::sync::mpsc;
 use super::{Done, Job, account};
 use crate::core::buffers::Recycler;
 
-/// Where answers go, from the thread that rendered and on it.
+/// Where a thread delivers the answers of a slot.
 pub(crate) trait Sink: Send + Sync {
-    /// Takes an answer; must not wait.
+    /// Takes an answer. It must not block.
     fn deliver(&self, done: Done);
 
     /// Whether its client is gone.
     fn is_gone(&self) -> bool;
 
-    /// Takes the buffers of the slot, which is no more.
+    /// Takes the buffers of the slot, which is being dropped.
     fn take_back(&self, recycler: &mut Recycler);
 }
 
-/// A task that awaits answers: as many are kept as the channel has places.
+/// A task that awaits answers. The channel holds as many as it has places.
 impl Sink for mpsc::Sender<Done> {
     fn deliver(&self, done: Done) {
-        // Err: whoever waited is gone, or (never, with places for all) does not fetch them.
+        // `Closed`: the client is gone. `Full` never happens with a place for every answer.
         if let Err(mpsc::error::TrySendError::Full(_)) = self.try_send(done) {
             tracing::error!("a client's answers are not fetched; one was dropped");
         }
@@ -35,15 +35,15 @@ impl Sink for mpsc::Sender<Done> {
         self.is_closed()
     }
 
-    /// They go with the slot.
+    /// The buffers are freed with the slot.
     fn take_back(&self, _recycler: &mut Recycler) {}
 }
 
 /// What an offer came to.
 #[derive(Debug)]
 pub(crate) enum Offer {
-    /// The slot is on its way to a thread already. The unstarted job whose
-    /// place was taken, if there was one.
+    /// The slot is in the queue or with a thread already. `replaced` is the job that waited in it,
+    /// if there was one.
     Scheduled {
         /// The job that will not be run.
         replaced: Option<Job>,
@@ -55,11 +55,11 @@ pub(crate) enum Offer {
 /// The account of a session, or of one client's posts.
 pub(crate) type Account = account::Account<Slot>;
 
-/// The meeting point of one client and the pool.
+/// Where one finger of a session, or one HTTP request, leaves its next frame for the pool.
 ///
-/// A slot is in the queue or with a thread at most once, so a session never has
-/// two frames under way, answers keep the order of the frames, and the queue is
-/// bounded by the number of slots.
+/// A slot is in the queue or with a thread at most once. Therefore a finger never has two frames
+/// being rendered, its answers keep the order of its frames, and the number of slots bounds the
+/// queue.
 pub(crate) struct Slot {
     state: Mutex<State>,
     sink: Arc<dyn Sink>,
@@ -75,14 +75,14 @@ struct State {
 }
 
 impl Slot {
-    /// An empty slot, whose answers are written into the buffers of `recycler` and go to `sink`;
-    /// what they cost goes to `account`.
+    /// An empty slot. Its answers are written into the buffers of `recycler` and go to `sink`, and
+    /// their cost is charged to `account`.
     pub(crate) fn new(recycler: Recycler, sink: Arc<dyn Sink>, account: Arc<Account>) -> Self {
         let state = State { waiting: None, scheduled: false, recycler };
         Self { state: Mutex::new(state), sink, account }
     }
 
-    /// Whose frames these are.
+    /// The account that its frames are charged to.
     pub(super) fn account(&self) -> &Arc<Account> {
         &self.account
     }
@@ -92,7 +92,7 @@ impl Slot {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts a job in; a job that waits is replaced.
+    /// Puts a job in. A job that waits there is replaced.
     pub(crate) fn offer(&self, job: Job) -> Offer {
         let mut state = self.state();
         let replaced = state.waiting.replace(job);
@@ -110,7 +110,8 @@ impl Slot {
         state.waiting.take()
     }
 
-    /// A thread takes the job, and the buffers for its answer.
+    /// Gives a thread the job and the buffers for its answer. None: there is no job, and the slot
+    /// is idle from now on.
     pub(super) fn take(&self) -> Option<(Job, Recycler)> {
         let mut state = self.state();
         match state.waiting.take() {
@@ -122,8 +123,8 @@ impl Slot {
         }
     }
 
-    /// The thread is done; true if another job has come meanwhile and the slot
-    /// must go into the queue again.
+    /// Delivers the answer. True: another job has come meanwhile, so the slot must go into the
+    /// queue again.
     pub(super) fn finish(&self, done: Done, recycler: Recycler) -> bool {
         self.sink.deliver(done);
         let mut state = self.state();

@@ -31,10 +31,10 @@ use crate::{
     problem,
 };
 
-/// Everything a thread owns; nothing is allocated after `prepare`.
+/// Everything that an inference thread owns. No frame allocates any of it.
 pub(super) struct Worker {
     metrics: Arc<Metrics>,
-    /// By the places of the fingers.
+    /// Indexed by the places of the fingers.
     fingers: Vec<OfFinger>,
     maps: Maps,
 }
@@ -61,7 +61,8 @@ impl Worker {
     pub(super) fn run(&mut self, queue: &Queue, inbox: &Inbox) {
         loop {
             let next = queue.pop(POP_TIMEOUT);
-            // After the wait: a job for a new tier comes only once its session is there.
+            // This comes after the wait: a job for a new tier is submitted only once its session is
+            // in the inbox.
             inbox.collect(&mut self.fingers);
             let turn = match next {
                 Next::Turn(turn) => turn,
@@ -74,7 +75,7 @@ impl Worker {
         }
     }
 
-    /// Serves a slot; what it cost, and whether another job has come meanwhile.
+    /// Serves a slot. Returns what that cost, and whether another job has come meanwhile.
     fn take_turn(&mut self, slot: &Slot) -> (Spent, bool) {
         let (begun, cpu_begun) = (Instant::now(), processor_time());
         let mut spent = Spent { busy: Duration::ZERO, beside_network: None };
@@ -86,7 +87,8 @@ impl Worker {
             self.serve(&mut job, &mut recycler)
         };
         let is_rendered = matches!(done.outcome, Outcome::Map { .. });
-        // Of what failed or came too late, a long time tells as much and a short one nothing.
+        // A frame that failed or was late counts against its account if it took long. If it was
+        // short, that says nothing, since it was not rendered.
         let beside_network =
             processor_time().saturating_sub(cpu_begun).saturating_sub(done.times.network);
         if is_rendered || beside_network > LONG {
@@ -100,7 +102,7 @@ impl Worker {
         (spent, is_again)
     }
 
-    /// Renders one job; a panic below becomes an error of this job alone.
+    /// Renders one job. A panic becomes an error of this job alone.
     fn serve(&mut self, job: &mut Job, recycler: &mut Recycler) -> Done {
         let mut progress = Progress::default();
         progress.times.queue = job.received.elapsed();
@@ -123,7 +125,7 @@ impl Worker {
         finished(job, progress, outcome)
     }
 
-    /// A fresh session takes the place of one that panicked.
+    /// Replaces the engine session that panicked by a new one.
     fn recover(&mut self, number: usize) -> Outcome {
         let (finger, place) = places(number);
         let OfFinger { catalogue, sessions } = &mut self.fingers[finger];
@@ -153,12 +155,12 @@ impl Worker {
         Progress { times, meta }: &mut Progress,
     ) -> Result<Outcome, Problem> {
         let start = Instant::now();
-        // The frame's memory goes back to its session before the network is asked.
+        // Dropped before the network runs, so that the session gets the frame's memory back early.
         let payload = mem::take(&mut job.payload);
         let options = &job.options;
         let mut effects = options.effects.as_ref().map(|e| lock(e));
         let mut finger = options.finger.as_ref().map(|f| lock(f));
-        // Without anything that shows SED, poses go in and forces come out.
+        // A finger whose effects show no SED needs no network: poses go in and forces come out.
         let shows_sed = finger.is_none() || effects.as_ref().is_none_or(|e| e.shows_sed());
         let is_tracked = options.header.is_none_or(|header| header.is_tracked());
         let (summary, range, source) = if !is_tracked {
@@ -176,7 +178,7 @@ impl Worker {
         let OfFinger { catalogue, sessions } = &mut self.fingers[of];
         let tier = &catalogue.tiers[place];
         let &JobOptions { headroom, time_us, .. } = options;
-        // Posted maps have headers for it.
+        // A map without a finger came by HTTP: headers of the answer state the error.
         let tells_error = finger.as_ref().is_none_or(|finger| finger.tells_error());
         let known = Known {
             skin: &catalogue.skin_pixels,
@@ -184,7 +186,7 @@ impl Worker {
             response_max_per_mpa: tier.response_max_per_mpa,
             errors: catalogue.error_laws.as_ref().filter(|_| tells_error).map(|laws| KnownErrors {
                 laws,
-                // What another finger trained errs otherwise on this one.
+                // The error laws do not hold for a network that was trained on another finger.
                 onnx_sha256: tier.trained_on.is_none().then_some(&tier.onnx_sha256),
             }),
         };
@@ -217,7 +219,7 @@ impl Worker {
         } else {
             let cpu_begun = processor_time();
             rendering.infer(session).map_err(of_network("the inference failed"))?;
-            // What another finger trained knows no map of this one.
+            // To a network that was trained on another finger every map is unfamiliar.
             meta.flags |= if tier.trained_on.is_some() { flags::UNFAMILIAR } else { 0 };
             times.network = processor_time().saturating_sub(cpu_begun);
             times.infer = decoded.elapsed();
@@ -272,7 +274,8 @@ impl Worker {
         Ok(Outcome::Map { bytes, scale })
     }
 
-    /// Reads a frame of a finger; pressure on one of reference stiffness is left.
+    /// Reads a frame of a finger and finds its pressure, which is left in `self.maps` as that on a
+    /// finger of reference stiffness.
     fn take(
         &mut self,
         job: &Job,
@@ -308,7 +311,7 @@ impl Worker {
         }
     }
 
-    /// Decodes and checks the pressure; what lies off the skin is taken off.
+    /// Decodes and checks a pressure map, and sets the pixels off the skin to zero.
     fn decode(
         &mut self,
         job: &Job,
@@ -321,12 +324,12 @@ impl Worker {
     }
 }
 
-/// One job of a session is with a thread at a time, so nobody waits here.
+/// Nobody ever waits here: at most one job of a finger is being rendered.
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// How far a job has come.
+/// What is known of a job so far: times, flags and error estimate.
 #[derive(Debug, Default)]
 struct Progress {
     times: Times,

@@ -24,17 +24,17 @@ use super::{
 /// How long after the last frame of a light account a thread is kept free for the next one.
 const LIGHT_FOR: Duration = Duration::from_secs(2);
 
-/// What a thread finds.
+/// What a thread finds when it asks for work.
 pub(super) enum Next {
     /// A slot with a job.
     Turn(Turn),
-    /// Nothing within the wait.
+    /// No slot had its turn within the wait.
     Nothing,
-    /// Nothing, and nothing will come.
+    /// The queue is closed and empty: the thread ends.
     Closed,
 }
 
-/// A slot whose turn it is; [`Queue::done`] ends it.
+/// A slot whose turn it is. [`Queue::done`] ends the turn.
 pub(super) struct Turn {
     pub(super) slot: Arc<Slot>,
     weight: Weight,
@@ -42,7 +42,7 @@ pub(super) struct Turn {
     charged: Duration,
 }
 
-/// Slots with a job, by what their accounts have cost.
+/// The slots that have a job, ordered by what their accounts have cost.
 pub(super) struct Queue {
     state: Mutex<State>,
     arrival: Condvar,
@@ -67,7 +67,8 @@ struct State {
     closed: bool,
 }
 
-/// An account in a heap; the greatest is due first, and of equals the first to come.
+/// An account in a heap. The order is reversed, so that the greatest entry is the one that is due
+/// first; of equals it is the one that came first.
 struct Entry {
     due: Duration,
     arrival: u64,
@@ -153,7 +154,7 @@ impl State {
             let mut ledger = account.ledger();
             ledger.listed = None;
             if ledger.due > due || ledger.weight(now) != weight {
-                // It was charged since, or weighs something else now.
+                // Its due time or its weight has changed since, so it is listed anew.
                 self.list(&account, &mut ledger, now);
                 continue;
             }
@@ -183,7 +184,8 @@ impl State {
             self.light_seen = Some(now);
         }
         if is_light && ledger.listed == Some(Weight::Heavy) {
-            // Once for an account, as a rule: its first frame was short.
+            // The search is linear, but as a rule it happens once for an account: after its first
+            // short frame.
             self.heavy.retain(|entry| !Arc::ptr_eq(&entry.account, &account));
             ledger.listed = None;
         }
@@ -194,7 +196,7 @@ impl State {
 }
 
 impl Queue {
-    /// A queue of at most `places` slots before so many threads; all its memory is taken here.
+    /// A queue of at most `places` slots for this many threads. All its memory is taken here.
     pub(super) fn new(places: usize, threads: usize) -> Self {
         let state = State {
             light: BinaryHeap::with_capacity(places),
@@ -215,7 +217,7 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a slot in; false if the queue is full or closed.
+    /// Queues a slot. False: the queue is full or closed.
     pub(super) fn push(&self, slot: Arc<Slot>) -> bool {
         let mut state = self.state();
         if state.closed || state.slots >= self.places {
@@ -230,12 +232,13 @@ impl Queue {
         true
     }
 
-    /// Ends a turn. With `is_again` its slot has another job; closed or not, that was accepted.
+    /// Ends a turn. With `is_again` the slot has another job and waits again, even if the queue is
+    /// full or closed: that job was accepted before.
     pub(super) fn done(&self, turn: Turn, spent: Spent, is_again: bool) {
         let mut state = self.state();
         state.end(turn, spent, is_again, Instant::now());
-        // Its slot waits again, or a heavy account waited for the end of a heavy turn. Where nothing
-        // waits, another thread would be woken for nothing after every frame.
+        // Another thread may now have work: the slot waits again, or a heavy account waited for a
+        // heavy turn to end. If nothing waits, nobody is woken.
         let is_to_wake = state.asleep > 0 && (state.slots > 0 || state.closed);
         drop(state);
         if is_to_wake {
