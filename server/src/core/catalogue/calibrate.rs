@@ -14,17 +14,19 @@ use crate::{
     core::latency::{probe_map, us},
 };
 
-/// Runs of one tier after which its times are known well enough.
+/// The most timed runs of one tier.
 const RUNS_MAX: usize = 300;
-/// Timed runs of a tier however slow it is.
+/// The fewest timed runs of one tier, however slow it is.
 const RUNS_MIN: usize = 2;
-/// What handing a frame from socket to thread and back adds, us; seen on a virtual machine.
+/// What handing a frame from the socket to a thread and back adds, us; measured on a virtual
+/// machine.
 const HAND_OVER_US: u64 = 120;
 
-/// Measures on this thread every tier that was not measured yet, in about `time` altogether: an
-/// equal share each, but never less than [`RUNS_MIN`] runs after one that warms it.
+/// Times every loaded tier that was not calibrated yet, on this thread and in about `time`
+/// altogether. Each gets an equal share, but never less than [`RUNS_MIN`] runs after one that warms
+/// it up.
 ///
-/// With no time, the shipped times stand.
+/// With zero `time` nothing is measured, and the shipped times stand.
 ///
 /// # Errors
 /// A tier does not run.
@@ -32,8 +34,8 @@ pub(crate) fn calibrate(catalogue: &Catalogue, time: Duration) -> Result<(), Sta
     calibrate_noting(catalogue, time, &mut |_| ())
 }
 
-/// The same, the tiers that are expected to be the fastest first; `note` is told each when it is
-/// done.
+/// As [`calibrate`], and calls `note` with the name of each tier when it is done. The tiers that
+/// are expected to be the fastest come first.
 ///
 /// # Errors
 /// A tier does not run.
@@ -79,19 +81,19 @@ pub(crate) fn measure_effects(catalogue: &Catalogue) {
     effects::measure(catalogue.finger(), &contact_pa);
 }
 
-/// Measures a tier with its model, in about `share`.
+/// Times a tier with its model, in about `share`.
 ///
 /// # Errors
-/// It does not run.
+/// The tier does not run.
 pub(crate) fn measure(tier: &Tier, model: &dyn Model, share: Duration) -> Result<(), StartError> {
     tier.latency.calibrate(&mut runs(tier, model, share)?);
     Ok(())
 }
 
-/// Measures a tier again that no frame has measured since the last look, if it is loaded.
+/// Times a tier again if it is loaded and no frame of it has been timed since the last call.
 ///
 /// # Errors
-/// It does not run.
+/// The tier does not run.
 pub(crate) fn remeasure(tier: &Tier) -> Result<(), StartError> {
     if let Some(model) = tier.model().filter(|_| tier.latency.is_idle()) {
         tier.latency.correct(&mut runs(tier, model.as_ref(), Duration::ZERO)?);
@@ -113,7 +115,7 @@ fn runs(tier: &Tier, model: &dyn Model, share: Duration) -> Result<Vec<Duration>
     Ok(times)
 }
 
-/// Time of decoding, checking and encoding one f32 map, us: the least of several.
+/// Time of decoding, checking and encoding one f32 map, us: the least of eight runs.
 fn codec_us() -> Option<u64> {
     let mut map = vec![0.0; MAP_LEN];
     probe_map(1e4, &mut map);

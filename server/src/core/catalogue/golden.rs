@@ -23,44 +23,45 @@ const TIMES_P95: f64 = 3.0;
 /// An error that is always allowed, so that a nearly exact model is not refused for its rounding.
 const ERROR_MIN: f64 = 0.05;
 
-/// Least share of the FE solver's map in an answer, whatever error the card allows. A model of
-/// zeros holds nothing, one in kJ/m3 a thousandth; of the shipped models a half-space holds .22 and
-/// all others .7 or more.
+/// Least share of the FE solver's map in an answer, whatever error the card allows. A model that
+/// answers zeros has 0, one that answers in kJ/m3 has 0.001. Of the shipped models the half-space
+/// has 0.22 and all others 0.7 or more.
 const SHARE_MIN: f64 = 0.1;
 
-/// The state a model does worst.
+/// The comparison of a model's answers with the FE solver's: its worst state, and the least share
+/// of all states.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Golden {
     /// Number of states compared.
     #[serde(rename = "presses")]
     pub(crate) states: usize,
-    /// Name of the worst.
+    /// Name of the state with the greatest error.
     #[serde(rename = "press")]
     pub(crate) state: String,
-    /// Its relative L2 error.
+    /// Relative L2 error of the answer to that state.
     pub(crate) relative_l2: f64,
-    /// The error it may have.
+    /// Greatest error with which the model is still accepted.
     pub(crate) relative_l2_max: f64,
-    /// Least share of the true map in an answer: `sum found true / sum true^2`.
+    /// Least share, over all states, of the true map in the answer: `sum found true / sum true^2`.
     pub(crate) share: f64,
 }
 
 /// Why a model is not to be trusted.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum GoldenError {
-    /// It does not run.
+    /// The model does not run.
     #[error("it does not run: {0}")]
     Engine(#[from] EngineError),
     /// The state does not fit the atlas.
     #[error("press '{state}' does not fit the atlas: {reason}")]
     State { state: String, reason: String },
-    /// It answers wrongly.
+    /// An answer differs too much from the FE solver's.
     #[error(
         "its answer to state '{}' is off by {:.3} of the FE solver's (relative L2), {:.3} is the \
          most its card allows", .0.state, .0.relative_l2, .0.relative_l2_max
     )]
     Wrong(Golden),
-    /// It answers next to nothing.
+    /// An answer holds next to nothing of the FE solver's map.
     #[error(
         "its answers hold {:.3} of the FE solver's map, {SHARE_MIN} is the least: are they in J/m3, \
          and the right way up?", .0.share
@@ -68,7 +69,7 @@ pub(crate) enum GoldenError {
     Empty(Golden),
 }
 
-/// What is asked for, and where on a map it lies.
+/// The states that models are tried on, and the pixels that their values belong to.
 #[derive(Clone, Copy)]
 pub(crate) struct States<'a> {
     pub(crate) replay: &'a Replay,
@@ -76,11 +77,12 @@ pub(crate) struct States<'a> {
     pub(crate) interface: &'a Raster,
 }
 
-/// Asks a model for every state of the replay; None if there are none. The card allows it the error
-/// `relative_l2_p95` in one state of twenty.
+/// Runs a model on every state of the replay and compares its answers. `relative_l2_p95` is the
+/// 95th percentile of the error on the model's card. None: the replay has no states.
 ///
 /// # Errors
-/// It does not run, or an answer is further off than its card allows.
+/// The model does not run, a state does not fit the atlas, or an answer is further off than the
+/// card allows.
 pub(crate) fn check(
     of: States<'_>,
     model: &dyn Model,
@@ -126,8 +128,9 @@ pub(crate) fn check(
     }
 }
 
-/// Gives a model back to tract that another backend answers wrongly; `in_tract` loads it there.
-/// That backend was the faster one and did well on one map.
+/// If another backend than tract answers the golden states wrongly, replaces the model by the one
+/// that `in_tract` loads. The other backend had been chosen because it was faster and right on one
+/// map.
 ///
 /// # Errors
 /// The model does not load in tract.

@@ -20,41 +20,42 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    /// A model that is there.
+    /// A model that is loaded already.
     pub(crate) fn loaded(model: Arc<dyn Model>) -> Arc<Self> {
         Arc::new(Self { model: OnceLock::from(model), failed: Mutex::default() })
     }
 
-    /// The model; none before its first use.
+    /// The model; None while it is not loaded.
     pub(crate) fn model(&self) -> Option<&Arc<dyn Model>> {
         self.model.get()
     }
 
-    /// From here on the model answers: every thread has a session of it.
+    /// Makes the model available. Every inference thread must have a session of it, or get one
+    /// before its next job.
     pub(crate) fn open(&self, model: Arc<dyn Model>) {
-        // Err: it is there already, and is the same.
+        // Fails if it was set before, which was with the same model.
         let _ = self.model.set(model);
     }
 
-    /// Why it could not be loaded a moment ago.
+    /// The problem of the last attempt, if that failed less than [`RETRY_AFTER`] ago.
     pub(crate) fn failed_lately(&self) -> Option<Problem> {
         let failed = self.failed();
         let (when, problem) = failed.as_ref()?;
         (when.elapsed() < RETRY_AFTER).then(|| problem.clone())
     }
 
-    /// It could not be loaded.
+    /// Notes that it could not be loaded.
     pub(crate) fn fail(&self, problem: Problem) {
         *self.failed() = Some((Instant::now(), problem));
     }
 
-    /// It may be tried again at once.
+    /// Forgets a failure, so that loading may be tried again at once.
     pub(crate) fn forgive(&self) {
         *self.failed() = None;
     }
 
     fn failed(&self) -> MutexGuard<'_, Option<(Instant, Problem)>> {
-        // What is written is written whole, so a poisoned lock is usable.
+        // The value is only ever replaced as a whole, so a poisoned lock is usable.
         self.failed.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -21,8 +21,7 @@ use crate::{
     core::{digest::sha256_hex, latency::Latency},
 };
 
-/// Reads the ladder. Rungs measured on another file than the tier's are left out: their figures
-/// are of a model that is not served.
+/// Reads the ladder. Rungs that were measured with another model file than the tier's are left out.
 pub(super) fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<Ladder, String> {
     let mut ladder = Ladder::from_json(text(json)?).map_err(|error| error.to_string())?;
     if ladder.atlas_hash != atlas.hash() {
@@ -43,7 +42,7 @@ pub(super) fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<
     Ok(ladder)
 }
 
-/// Reads the laws of errors; those of another atlas are passed over.
+/// Reads the error laws. None: they were calibrated on another atlas, which is logged.
 pub(super) fn load_error_laws(
     json: &[u8],
     atlas: &Atlas,
@@ -66,12 +65,14 @@ pub(super) fn load_error_laws(
     Ok(Some(laws))
 }
 
-/// The shipped time of a tier, ms, in what runs it here.
+/// The time of a tier in the ladder, ms, with the backend that runs it here.
 fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
     ladder.rung_of(&tier.name)?.time_ms_in(tier.backend())
 }
 
-/// Gives tiers the shipped times and errors, marks what no budget picks; the set they are judged on.
+/// Gives the tiers their times and errors from the ladder, and marks those that no budget may pick.
+/// Returns the name of the test set that all tiers are compared on; None: there is no ladder, or no
+/// set has an error of every tier.
 pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<String> {
     let is_choice = tiers.iter().any(|tier| tier.knows_contact);
     for tier in tiers.iter_mut() {
@@ -81,7 +82,8 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
     }
     let ladder = ladder?;
     for tier in tiers.iter() {
-        // A tier that goes on over a reload shares its times, which it has learnt here.
+        // A tier that outlasts a reload shares its times with the old catalogue, and has measured
+        // them here.
         if let (Some(ms), 1) = (shipped_ms(ladder, tier), Arc::strong_count(&tier.latency)) {
             tier.latency.expect(milliseconds(ms));
         }
@@ -108,7 +110,7 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
     Some(set.to_owned())
 }
 
-/// Factor by which a shipped time may be greater without counting as slower.
+/// A tier whose shipped time is at most this many times another's does not count as slower.
 const MARGIN: f64 = 1.1;
 
 fn milliseconds(ms: f64) -> Duration {
@@ -119,8 +121,12 @@ pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
     json::text(bytes).map_err(|error| error.to_string())
 }
 
-/// Whether a tier is of the atlas beside it; one that another finger trained is marked, where the
-/// index says so.
+/// Requires that a tier was trained on the atlas of this folder. If it was not, it may still be a
+/// network borrowed from another finger: the index has to say so, and both atlases have to be alike
+/// ([`APART_MAX_PX`]). Then the tier is marked as borrowed.
+///
+/// # Errors
+/// The reason why the tier cannot serve this finger.
 pub(super) fn require_atlas(
     tier: &mut Tier,
     atlas: &Atlas,
@@ -166,7 +172,7 @@ pub(super) fn require_atlas(
     Ok(())
 }
 
-/// A card, and the same as it was shipped.
+/// A card, and the JSON that it was read from.
 pub(crate) struct ReadCard {
     pub(crate) card: Card,
     shipped: Value,
@@ -181,21 +187,21 @@ impl ReadCard {
     }
 }
 
-/// What the settings say of loading.
+/// How models are to be loaded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Loading<'a> {
-    /// The tier to take unasked, if not the index's.
+    /// The default tier, if it is to be another than the index's.
     pub(crate) default: Option<&'a str>,
     backend: Choice,
     calibration: Duration,
     what: What,
-    /// The finger whose networks may serve, by similarity alone; none: its own alone.
+    /// The finger whose networks this one may borrow. None: only networks of its own may serve.
     similar: Option<Similar<'a>>,
 }
 
-/// So far apart the places of one vertex may be on the maps of two fingers of which one borrows the
-/// other's networks, px. A finger that was scaled as a whole is .01 px off, one that is a sixth wider
-/// and else the same 12 px.
+/// Greatest distance, px, between the places of the same vertex on the maps of two fingers, if one
+/// is to borrow the other's networks. For a finger scaled as a whole it is 0.01 px; for one that is
+/// a sixth wider and otherwise the same it is 12 px.
 const APART_MAX_PX: f32 = 16.0;
 
 /// A finger whose networks another one borrows.
@@ -206,8 +212,8 @@ pub(crate) struct Similar<'a> {
 }
 
 impl Similar<'_> {
-    /// How far apart the places of one vertex are on the maps of both fingers, at most, px; none if
-    /// the vertices are not the same.
+    /// The greatest distance, px, between the places of the same vertex on both maps. None: the two
+    /// atlases have other triangles.
     fn apart_px(&self, atlas: &Atlas) -> Option<f32> {
         let mut apart_px: f32 = 0.0;
         for patch in [Patch::Skin, Patch::Interface] {
@@ -220,12 +226,12 @@ impl Similar<'_> {
     }
 }
 
-/// Which models are loaded at once, beside those that run already.
+/// Which models are loaded now. Models that run already are loaded in any case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum What {
-    /// The default's; the others of the start when that answers.
+    /// Only the default tier's, which then answers while the others are being loaded.
     Default,
-    /// Those that are not loaded on demand.
+    /// All but those that are loaded on demand.
     OfStart,
     All,
 }
@@ -237,22 +243,24 @@ impl<'a> Loading<'a> {
         Self { default, backend, calibration, what: What::OfStart, similar: None }
     }
 
-    /// The same, of the default tier's model alone: it answers before the others are loaded.
+    /// As [`of`](Self::of), but for the default tier's model alone, so that it answers before the
+    /// others are loaded.
     pub(crate) fn of_default(config: &'a Config) -> Self {
         Self { what: What::Default, ..Self::of(config) }
     }
 
-    /// The same of another finger than the default one; it may borrow networks, if its index says so.
+    /// The same for another finger than the default one. It may borrow networks of `lender` if its
+    /// index says so.
     pub(crate) fn of_finger(self, lender: Similar<'a>) -> Self {
         Self { default: None, similar: Some(lender), ..self }
     }
 
-    /// The same, of all models: none waits until it is named.
+    /// As [`of`](Self::of), but all models are loaded, also those on demand.
     pub(crate) fn of_all(config: &'a Config) -> Self {
         Self { what: What::All, ..Self::of(config) }
     }
 
-    /// Whether a model is loaded when a client first names it.
+    /// Whether a model waits until a client first names it.
     pub(super) fn is_on_demand(self, name: &str, index: &Index) -> bool {
         let is_listed = index.on_demand.iter().any(|listed| listed == name);
         is_listed && self.default != Some(name)
@@ -267,7 +275,7 @@ impl<'a> Loading<'a> {
         }
     }
 
-    /// What a tier is expected to run in.
+    /// The backend that a tier is expected to run in.
     fn backend_expected(self) -> Backend {
         match self.backend {
             Choice::Auto => Backend::Tract,
@@ -275,12 +283,12 @@ impl<'a> Loading<'a> {
         }
     }
 
-    /// Loads the model called `name`, one of so many. Finding out which backends are faster takes
-    /// half as long as the calibration. What was chosen for its speed is tried on golden answers;
-    /// what fails there runs in tract.
+    /// Loads the model called `name`, one of `of` models. Choosing a backend by its speed takes up
+    /// to half of the calibration's time, shared by all models. A model in a backend chosen that
+    /// way is tried on the golden states, and runs in tract if it fails there.
     ///
     /// # Errors
-    /// It is unusable, or calls itself otherwise.
+    /// The file is unusable, or names another model.
     pub(crate) fn model(
         self,
         name: &str,
@@ -302,21 +310,21 @@ impl<'a> Loading<'a> {
     }
 }
 
-/// What a tier is made of.
+/// The files of a tier.
 pub(super) struct TierFiles<'a> {
     pub(super) name: &'a str,
-    /// The model's file; none of a tier that waits for its first use.
+    /// The bytes of the network. None: the tier waits for its first use.
     pub(super) onnx: Option<&'a [u8]>,
     pub(super) card: ReadCard,
     pub(super) on_demand: bool,
 }
 
 impl TierFiles<'_> {
-    /// The tier, one of so many to load. If its file is that of `running`, the two share the model,
-    /// its times and its count of sessions.
+    /// Makes the tier, one of `of` that are loaded. If its file is the same as that of `running`,
+    /// both share the model and its times. They always share the count of sessions.
     ///
     /// # Errors
-    /// A file is unusable, or at odds with the other.
+    /// A file is unusable, or card and network contradict each other.
     pub(super) fn load(
         self,
         loading: Loading<'_>,
@@ -334,7 +342,8 @@ impl TierFiles<'_> {
         let held = match (same, onnx) {
             (Some(tier), _) if tier.is_loaded() => Arc::clone(&tier.held),
             (Some(tier), None) => {
-                // Whoever loads anew may have mended what was broken.
+                // The file may have been mended before this reload, so a failure does not count any
+                // more.
                 tier.held.forgive();
                 Arc::clone(&tier.held)
             }

@@ -40,15 +40,15 @@ use crate::{
     core::{cache::Cache, latency::Overhead},
 };
 
-/// How far loading has come.
+/// A step of loading, told while it goes on.
 pub(crate) enum Step<'a> {
     /// These models will be loaded.
     Listed(&'a [String]),
-    /// This one is.
+    /// This model is loaded.
     Loaded(&'a str),
 }
 
-/// Which answer about a catalogue is kept: those that do not change while it lasts.
+/// Key of the cached answers about a catalogue, which do not change while it is in use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Document {
     Models,
@@ -64,10 +64,10 @@ pub(crate) enum Document {
     StateMap(usize, Quantity, Output),
 }
 
-/// All there is to render one finger with and to show of it.
+/// Everything needed to render one finger and to show it.
 ///
 /// **Invariant:** a tier keeps its place in `tiers` for the life of the process, whatever is
-/// reloaded: jobs and sessions name tiers by their number, in which it is.
+/// reloaded. Jobs and sessions name a tier by a number that contains this place.
 pub(crate) struct Catalogue {
     /// The finger's name.
     pub(crate) name: String,
@@ -75,7 +75,7 @@ pub(crate) struct Catalogue {
     pub(crate) place: usize,
     /// In the index's order.
     pub(crate) tiers: Vec<Tier>,
-    /// Index of the tier to take unasked.
+    /// Index of the tier for clients that name neither a tier nor a budget.
     pub(crate) default: usize,
     pub(crate) atlas: Atlas,
     pub(crate) atlas_json: Bytes,
@@ -86,24 +86,26 @@ pub(crate) struct Catalogue {
     pub(crate) replay: Replay,
     /// All rungs as shipped, FE included, as JSON; `null` if the folder has no `ladder.json`.
     pub(crate) ladder_json: String,
-    /// By what the errors of answers are told; none: the folder has no `errors.json` of this atlas.
+    /// The laws by which the error of an answer is estimated. None: the folder has no `errors.json`
+    /// of this atlas.
     pub(crate) error_laws: Option<ErrorLaws>,
-    /// The set by which tiers are compared; none: each by its card.
+    /// The test set by whose errors tiers are compared. None: each is judged by the error on its
+    /// card.
     pub(crate) judged_on: Option<String>,
     pub(crate) overhead: Overhead,
-    /// What sessions with effects share.
+    /// What all sessions with effects share.
     pub(crate) runtime: effects::Shared,
-    /// Answers about all this.
+    /// Cached answers about this catalogue.
     pub(crate) cache: Cache<Document>,
 }
 
-/// The finger and the tier of a number, each by its place.
+/// Splits a tier's number into the place of the finger and the place of the tier.
 pub(crate) fn places(number: usize) -> (usize, usize) {
     (number / TIERS_MAX, number % TIERS_MAX)
 }
 
 impl Catalogue {
-    /// These tiers on this atlas, and nothing else.
+    /// A catalogue of these tiers on this atlas, without files.
     #[cfg(test)]
     pub(crate) fn bare(atlas: Atlas, tiers: Vec<Tier>) -> Self {
         let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
@@ -127,11 +129,11 @@ impl Catalogue {
         }
     }
 
-    /// Loads and checks everything. A tier whose file is that of `running` is not loaded again:
-    /// the two share the model, its times and its count of sessions.
+    /// Loads and checks everything. A tier whose file is the same as in `running` shares that one's
+    /// model and its times, and is not loaded again.
     ///
     /// # Errors
-    /// A file is missing, unreadable, or at odds with another.
+    /// A file is missing or unreadable, or two files contradict each other.
     pub(crate) fn load(
         assets: &Assets,
         loading: Loading<'_>,
@@ -140,7 +142,7 @@ impl Catalogue {
         Self::load_noting(assets, loading, running, &mut |_| ())
     }
 
-    /// The same; `note` is told what comes.
+    /// As [`load`](Self::load), and calls `note` at each step.
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -165,7 +167,7 @@ impl Catalogue {
                 return Err(bad("index.json", &format!("the model '{name}' is listed twice")));
             }
         }
-        // As clients get it: without a byte order mark.
+        // Clients get the file as it is here, without a byte order mark.
         let atlas_json = text(read("atlas.json")?).map_err(|e| bad("atlas.json", &e))?;
         let atlas = Atlas::from_json(atlas_json).map_err(|e| bad("atlas.json", &e))?;
         let atlas_json = Bytes::copy_from_slice(atlas_json.as_bytes());
@@ -185,7 +187,8 @@ impl Catalogue {
             let on_demand = is_late(name);
             let running =
                 running.and_then(|running| running.tiers.iter().find(|t| t.name == *name));
-            // A reload leaves no tier without a model that had one: sessions may render with it.
+            // A tier that was loaded before a reload is loaded after it too, since sessions may
+            // render with it.
             let is_to_load = loading.is_now(name, &index) || running.is_some_and(Tier::is_loaded);
             let bytes = if is_to_load {
                 Some(assets.model(&onnx)?)
@@ -240,27 +243,29 @@ impl Catalogue {
         })
     }
 
-    /// What models are tried on.
+    /// The states that models are tried on.
     pub(crate) fn golden_states(&self) -> golden::States<'_> {
         golden::States { replay: &self.replay, skin: &self.skin, interface: &self.interface }
     }
 
-    /// What effects are placed on.
+    /// The finger that effects are placed on.
     pub(crate) fn finger(&self) -> effects::Finger<'_> {
         let Self { atlas, skin, interface, runtime, .. } = self;
         effects::Finger { atlas, skin, interface, shared: runtime }
     }
 
-    /// Time of a tier from receipt to answer on an idle machine, us. Of one that was never measured
-    /// here: its shipped time, slower by as much as the slowest of those that were.
+    /// Expected time of a tier from receipt to answer, us, without the wait for a thread. For a
+    /// tier that was never timed here it is the shipped time, multiplied by the greatest slowdown
+    /// of the tiers that frames have used (at least 1).
     pub(crate) fn predicted_latency_us(&self, tier: usize) -> u64 {
         let latency = &self.tiers[tier].latency;
         let slower = if latency.is_measured() { 1.0 } else { self.slowdown() };
         ((slower * latency.typical_us() as f64) as u64).saturating_add(self.overhead.us())
     }
 
-    /// The same at its best: in its fastest run here, or as much slower than shipped as the tier
-    /// `by` is now.
+    /// A hopeful estimate of the same time, us: by the tier's fastest run here, or by its shipped
+    /// time and the present slowdown of the tier at place `by`, whichever is less. Never more than
+    /// [`predicted_latency_us`](Self::predicted_latency_us).
     pub(crate) fn hoped_latency_us(&self, tier: usize, by: usize) -> u64 {
         let latency = &self.tiers[tier].latency;
         let likewise_us = (self.tiers[by].latency.slowdown() * latency.expected_us() as f64) as u64;
@@ -268,26 +273,27 @@ impl Catalogue {
         self.predicted_latency_us(tier).min(best_us.saturating_add(self.overhead.us()))
     }
 
-    /// How much slower than shipped the tiers are that frames have measured; 1 at least.
+    /// The greatest factor by which tiers that frames have used are slower than shipped; at least
+    /// 1.
     fn slowdown(&self) -> f64 {
         let used = self.tiers.iter().filter(|tier| tier.latency.is_used());
         used.map(|tier| tier.latency.slowdown()).fold(1.0, f64::max)
     }
 
-    /// Whether a tier is expected to meet a budget; none without one.
+    /// Whether a tier is expected to meet the budget. None: there is no budget.
     pub(crate) fn meets(&self, tier: usize, budget_us: Option<u32>) -> Option<bool> {
         budget_us.map(|budget| self.predicted_latency_us(tier) <= u64::from(budget))
     }
 
-    /// Index of the tier called `name`.
+    /// Index of the tier called `name`; None if there is none or it was retired.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
         self.tiers.iter().position(|tier| tier.name == name && !tier.retired)
     }
 
-    /// Index of the tier called `name`.
+    /// As [`find`](Self::find), with an error that lists the tiers.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no tier of this name.
     pub(crate) fn tier_named(&self, name: &str) -> Result<usize, Problem> {
         self.find(name).ok_or_else(|| {
             let name = shortened(name);
@@ -301,12 +307,12 @@ impl Catalogue {
         self.tiers.iter().enumerate().filter(|(_, tier)| !tier.retired)
     }
 
-    /// The number that jobs and answers name the tier at `place` by.
+    /// The number by which jobs and answers name the tier at `place`.
     pub(crate) fn tier_number(&self, place: usize) -> usize {
         self.place * TIERS_MAX + place
     }
 
-    /// What metrics say of each tier, in the order of `tiers`.
+    /// The labels of each tier in the metrics, in the order of `tiers`.
     pub(crate) fn tier_labels(&self) -> impl Iterator<Item = TierLabels<'_>> {
         let name = |tier: &'_ str| match self.place {
             0 => Cow::Owned(tier.to_owned()),
@@ -323,16 +329,17 @@ impl Catalogue {
         })
     }
 
-    /// The names, for messages.
+    /// The names of the tiers on offer, for messages.
     pub(crate) fn names(&self) -> String {
         self.offered().map(|(_, t)| t.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
-    /// The tier for a client that named none.
+    /// The tier for a client that named none, among tiers that render `effects`. None: no tier that
+    /// renders them is loaded.
     ///
-    /// Without a budget: the default. With one: of the tiers that render
-    /// `effects` and are expected to meet it the most accurate, or else the fastest. Never one that
-    /// is loaded when it is named.
+    /// Without a budget it is the default tier, or else the first that is loaded. With a budget it
+    /// is the most accurate tier that is expected to meet it, or else the fastest. Tiers that are
+    /// loaded on demand are never chosen.
     pub(crate) fn choose(&self, budget_us: Option<u32>, effects: &[String]) -> Option<usize> {
         let Some(budget_us) = budget_us else {
             let mut fitting = self.ready_for(effects).map(|(place, _)| place);
@@ -342,8 +349,8 @@ impl Catalogue {
         self.choose_among(budget_us, effects, |_| true)
     }
 
-    /// The tier for a budget, of those that `may` be taken: the most accurate that is expected to
-    /// meet it, or else the fastest.
+    /// The tier for a budget among those that `may` accepts: the most accurate one that is expected
+    /// to meet the budget, or else the fastest.
     pub(crate) fn choose_among(
         &self,
         budget_us: u32,
@@ -358,20 +365,21 @@ impl Catalogue {
             .or_else(|| fitting().min_by_key(|&place| self.predicted_latency_us(place)))
     }
 
-    /// Places of the tiers that the start has still to load.
+    /// Places of the tiers that are to be loaded at the start and are not loaded yet.
     pub(crate) fn to_come(&self) -> impl Iterator<Item = usize> {
         let is_to_come = |tier: &Tier| !tier.on_demand && !tier.is_loaded();
         self.offered().filter(move |(_, tier)| is_to_come(tier)).map(|(place, _)| place)
     }
 
-    /// The tiers that render these effects and wait for nobody to name them, each with its place.
+    /// The loaded tiers that render these effects, each with its place, without those that are
+    /// loaded on demand.
     fn ready_for(&self, effects: &[String]) -> impl Iterator<Item = (usize, &Tier)> {
         let is_ready = |tier: &Tier| !tier.on_demand && tier.is_loaded();
         self.offered().filter(move |(_, tier)| is_ready(tier) && tier.renders(effects))
     }
 
-    /// The tiers that a budget may pick: they render these effects, and are not taken by
-    /// name alone, unless no other renders them. Never one that is loaded when it is named.
+    /// Places of the tiers that a budget may pick: they are loaded, render these effects, and are
+    /// not loaded on demand. Tiers marked as [`NamedOnly`] are left out if there are any others.
     pub(crate) fn for_budgets(&self, effects: &[String]) -> impl Iterator<Item = usize> {
         let fitting = move || self.ready_for(effects);
         let is_choice = fitting().any(|(_, tier)| tier.named_only.is_none());

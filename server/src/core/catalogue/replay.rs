@@ -5,15 +5,15 @@ use papilla_proto::json;
 use serde::Deserialize;
 use serde_json::Value;
 
-/// One state: how something pressed, and what the FE solver found.
+/// One state: how an indenter pressed, and what the FE solver found.
 #[derive(Debug, Deserialize)]
 pub(crate) struct State {
-    /// Name to show.
+    /// Name that the page shows.
     pub(crate) name: String,
-    /// Angles of what pressed, as the dataset's manifest has them.
+    /// Angles of the indenter, as the dataset's manifest has them.
     #[serde(default)]
     pub(crate) pose: Value,
-    /// Depth, mm.
+    /// Indentation depth, mm.
     pub(crate) depth_mm: f32,
     /// Pressure at each pixel of the skin, in the order of the raster's indices, Pa.
     pub(crate) pressure_pa: Vec<f32>,
@@ -29,10 +29,11 @@ pub(crate) struct Replay {
 }
 
 impl Replay {
-    /// Reads and checks the file; `pixels`: of skin and interface.
+    /// Reads and checks the file. `pixels` are the numbers of pixels of skin and of interface.
     ///
     /// # Errors
-    /// It is not the JSON that is due, or a state does not fit the atlas.
+    /// The JSON is not of the expected form, a value is negative or not finite, or a state does not
+    /// fit the atlas.
     pub(crate) fn parse(text: &[u8], pixels: [usize; 2]) -> Result<Self, String> {
         let replay: Self = json::read(text).map_err(|e| e.to_string())?;
         for (index, state) in replay.states.iter().enumerate() {

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::{Catalogue, Held, Tier};
 use crate::core::latency::Latency;
 
-/// What a model says of itself.
+/// Facts of a model called `name`.
 pub(crate) fn info(name: &str) -> ModelInfo {
     ModelInfo {
         name: name.to_owned(),
@@ -56,7 +56,7 @@ pub(crate) fn model(name: &str, backend: Backend, factor: f32) -> Arc<dyn Model>
     Arc::new(Times(info(name), backend, factor))
 }
 
-/// A tier that errs by so much.
+/// A tier with this median error.
 pub(crate) fn tier(model: Arc<dyn Model>, relative_l2_median: f64) -> Tier {
     Tier {
         name: model.info().name.clone(),

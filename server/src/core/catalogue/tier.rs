@@ -16,67 +16,69 @@ use crate::{
 /// One way of getting a SED map: a model, and what is known of it.
 #[derive(Clone)]
 pub(crate) struct Tier {
-    /// Name in the protocol.
+    /// Its name in the protocol.
     pub(crate) name: String,
     /// Its model, once it is loaded.
     pub(crate) held: Arc<Held>,
-    /// Whether it is loaded when a client first names it, and not before.
+    /// Whether it is loaded only when a client first names it.
     pub(crate) on_demand: bool,
     /// SHA-256 of the model's file, as its card names it.
     pub(crate) onnx_sha256: String,
-    /// What runs it, or is expected to while it is not loaded.
+    /// The backend that it is expected to run in, for the time while it is not loaded.
     pub(crate) backend_expected: Backend,
     /// The card as it was shipped.
     pub(crate) card: Value,
-    /// Effects it renders.
+    /// Effects of the physics that it was trained with.
     pub(crate) effects: Vec<String>,
     pub(crate) atlas_hash: String,
     /// Greatest pressure it was trained on, Pa.
     pub(crate) pressure_max_pa: f32,
-    /// Roughest and heaviest map it was trained on; none if it was fitted to no maps.
+    /// Greatest statistics of the maps it was trained on, by which unfamiliar maps are recognised;
+    /// None if it was not fitted to maps.
     pub(crate) input_statistics_max: Option<InputStatistics>,
-    /// Greatest SED over squared pressure it was trained on, 1/MPa; none likewise.
+    /// Greatest ratio of SED to squared pressure in its training, 1/MPa; None likewise.
     pub(crate) response_max_per_mpa: Option<f32>,
     /// Greatest SED it was trained on, J/m3.
     pub(crate) sed_max_j_per_m3: f32,
-    /// What it is.
+    /// What kind of rung it is on the ladder.
     pub(crate) kind: Kind,
     /// Median relative L2 error on `Catalogue::judged_on`.
     pub(crate) relative_l2_median: f64,
-    /// 95th percentile of that error on the card's own split.
+    /// 95th percentile of the relative L2 error on the test set of its card.
     pub(crate) relative_l2_p95: f64,
-    /// Whether it learnt the pressure that contact makes, beside FE's.
+    /// Whether its training included pressure from the contact methods, beside FE pressure.
     pub(crate) knows_contact: bool,
-    /// The finger whose presses trained it, if that is not its catalogue's: it serves by similarity
-    /// alone, and its answers say so.
+    /// The finger whose simulations trained it. None: that of this catalogue. Some: it serves by
+    /// similarity alone, and its answers have the flag for that.
     pub(crate) trained_on: Option<TrainedOn>,
-    /// Why no budget picks it; None: budgets do.
+    /// Why no budget picks it; None: budgets may.
     pub(crate) named_only: Option<NamedOnly>,
-    /// How long it takes here.
+    /// How long it takes on this machine.
     pub(crate) latency: Arc<Latency>,
-    /// Sessions that render with it now.
+    /// Number of sessions that render with it now.
     pub(crate) sessions: Arc<AtomicUsize>,
-    /// A reload found it gone: sessions that have it go on, nobody else gets it.
+    /// A reload no longer found it. Open sessions go on with it, and new ones cannot name it.
     pub(crate) retired: bool,
 }
 
-/// The finger whose presses trained a tier of another.
+/// The finger whose simulations trained another finger's tier.
 #[derive(Clone, Debug)]
 pub(crate) struct TrainedOn {
     pub(crate) name: String,
-    /// How far apart the places of one vertex are on the two maps, at most, px.
+    /// The greatest distance between the places of the same vertex on the two maps, px.
     pub(crate) apart_px: f32,
 }
 
-/// Why a tier is taken by name alone.
+/// Why a tier is used only if a client names it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum NamedOnly {
     /// Another tier is more accurate and no slower.
     Outdone,
-    /// It learnt FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
+    /// It was trained on FE pressure alone. From pressure of the contact methods, which most
+    /// sessions use, its SED is worse.
     FePressure,
-    /// It is loaded when a client names it: no budget waits for that.
+    /// It is loaded when a client names it, and a budget must not wait for that.
     OnDemand,
 }
 
@@ -86,29 +88,29 @@ impl Tier {
         effects.iter().all(|effect| self.effects.contains(effect))
     }
 
-    /// Its model; none before its first use.
+    /// Its model; None while it is not loaded.
     pub(crate) fn model(&self) -> Option<&Arc<dyn Model>> {
         self.held.model()
     }
 
-    /// Whether it answers.
+    /// Whether its model is loaded.
     pub(crate) fn is_loaded(&self) -> bool {
         self.model().is_some()
     }
 
-    /// What runs it, or is expected to while it is not loaded.
+    /// The backend that runs it, or the expected one while it is not loaded.
     pub(crate) fn backend(&self) -> Backend {
         self.model().map_or(self.backend_expected, |model| model.backend())
     }
 
-    /// The same with its version; none before its first use.
+    /// The backend with its version; None while the tier is not loaded.
     pub(crate) fn backend_label(&self) -> Option<&str> {
         self.model().map(|model| model.info().backend.as_str())
     }
 
-    /// A session of its model `model` that has rendered [`probe_map`]: the memory that frames will
-    /// use has been touched. `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold that map
-    /// and its answer.
+    /// A session of `model` that has rendered [`probe_map`], so that the memory that frames will
+    /// use has been touched. `pressure_pa` and `sed_j_per_m3` (224 x 224 each) hold that map and
+    /// its answer afterwards.
     ///
     /// # Errors
     /// The tier does not run.

@@ -25,10 +25,10 @@ use crate::{
     },
 };
 
-/// Failures that are remembered.
+/// The most failures that are remembered.
 const FAILED_MAX: usize = 16;
 
-/// Fingers that could not be loaded a moment ago, and why.
+/// Fingers that could not be loaded within the last [`RETRY_AFTER`], and why.
 #[derive(Default)]
 pub(super) struct Failed(Mutex<Vec<(String, Instant, Problem)>>);
 
@@ -47,7 +47,7 @@ impl Failed {
         }
     }
 
-    /// All may be tried again at once.
+    /// Forgets all failures, so that every finger may be tried again at once.
     fn forget(&self) {
         self.list().clear();
     }
@@ -58,9 +58,9 @@ impl Failed {
     }
 }
 
-/// What a reload makes of a finger.
+/// What a reload found for a finger.
 pub(super) enum Next {
-    /// This takes its place.
+    /// Its new catalogue and sessions, contact model and memory.
     Renewed(Box<Renewed>, Option<Arc<ContactAssets>>, Memory),
     /// Its folder is gone.
     Gone,
@@ -76,37 +76,38 @@ impl Next {
 }
 
 impl Reloader {
-    /// The fingers beside the default one that were loaded, by their places from 1.
+    /// The fingers beside the default one that were loaded. The one at index i has place i + 1.
     pub(crate) fn named(&self) -> Vec<Named> {
         self.named.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The finger of this name, if it is loaded and on offer; not the default one.
+    /// The finger of this name if it is loaded and on offer; never the default one.
     pub(crate) fn finger(&self, name: &str) -> Option<Named> {
         let named = self.named.read().unwrap_or_else(PoisonError::into_inner);
         let is_it = |named: &&Named| named.loaded.catalogue.name == name && !named.retired;
         named.iter().find(is_it).cloned()
     }
 
-    /// What the finger at `place` is rendered with; none if there is none.
+    /// The catalogue of the finger at `place`; None if no finger has that place.
     pub(crate) fn catalogue_at(&self, place: usize) -> Option<Arc<Catalogue>> {
         let Some(place) = place.checked_sub(1) else { return Some(self.catalogue()) };
         let named = self.named.read().unwrap_or_else(PoisonError::into_inner);
         named.get(place).map(|named| Arc::clone(&named.loaded.catalogue))
     }
 
-    /// Why the finger of this name could not be loaded a moment ago.
+    /// Why the finger of this name could not be loaded, if that was less than [`RETRY_AFTER`] ago.
     pub(crate) fn finger_failed_lately(&self, name: &str) -> Option<Problem> {
         self.failed.of(name)
     }
 
-    /// Loads the finger of this name, unless it is there: reads its folder, holds every file to the
-    /// others and its networks to their golden answers, measures them, and hands every thread warm
-    /// sessions. Takes seconds; not for a thread that moves bytes.
+    /// Loads the finger of this name if it is not loaded: reads its folder, checks that the files
+    /// belong together, checks its networks by their golden answers, times them, and hands warm
+    /// sessions to every thread. This takes seconds, so it must not run on a worker thread of
+    /// tokio.
     ///
     /// # Errors
-    /// There is none, too many are loaded, or it is unusable. Nothing has changed then: all others
-    /// answer as before.
+    /// There is no such finger, too many are loaded, it is unusable, or the drain began. Nothing
+    /// has changed then, and all other fingers answer as before.
     pub(crate) fn load_finger(&self, _turn: &Turn, name: &str) -> Result<(), Problem> {
         if self.finger(name).is_some() {
             return Ok(());
@@ -119,7 +120,7 @@ impl Reloader {
             if is_unusable {
                 tracing::error!(finger = name, %error, "not loaded");
             } else {
-                // Any client can ask for any name.
+                // Not logged as an error, since any client can send any name.
                 tracing::debug!(finger = name, %error, "not loaded");
             }
             let problem = error.into();
@@ -146,7 +147,7 @@ impl Reloader {
             FingerError::Unusable { name, source }
         };
         if let Some(index) = again {
-            // A reload found it gone, and it is there again.
+            // A reload found its folder gone, and now it is back.
             let next = self.renew_finger(&named[index], &folder).map_err(|error| match error {
                 ReloadError::Draining => FingerError::Draining,
                 ReloadError::Bundle(source) => unusable(source),
@@ -166,7 +167,7 @@ impl Reloader {
             bundle.map_err(unusable)?.ok_or(FingerError::Draining)?;
         let failed = |source: StartError| unusable(source.into());
         if !self.config.calibration().is_zero() {
-            // The fewest runs there are: a client waits.
+            // Zero time means the fewest runs, since a client is waiting.
             for tier in &catalogue.tiers {
                 let Some(model) = tier.model() else { continue };
                 calibrate::measure(tier, model.as_ref(), Duration::ZERO).map_err(failed)?;
@@ -182,7 +183,7 @@ impl Reloader {
             resident_bytes().zip(before).map(|(after, before)| after.saturating_sub(before));
         let memory = Memory { files_bytes, grown_bytes };
         self.name_tiers(&[&catalogue]);
-        // Threads first: whoever sees that it is loaded may submit a job at once.
+        // The threads come first: whoever sees that the finger is loaded may submit a job at once.
         self.exchange.hand_over(&catalogue, sessions);
         let tiers = catalogue.names();
         let loaded = Loaded { catalogue, contact };
@@ -193,8 +194,8 @@ impl Reloader {
         Ok(())
     }
 
-    /// Measures on a thread of its own, while the finger is served, what its contact and effects take,
-    /// if times are to be measured; until then they are expected, not known.
+    /// Times the finger's contact and effects on a thread of its own while the finger is served,
+    /// unless calibration is off. Until that is done, their times are estimates.
     fn measure_beside(&self, Loaded { catalogue, contact }: &Loaded) {
         if self.config.calibration().is_zero() {
             return;
@@ -206,13 +207,14 @@ impl Reloader {
             }
             calibrate::measure_effects(&catalogue);
         };
-        // Err: the system starts no thread, and expected times stand.
+        // If no thread can be started, the estimates stand.
         if let Err(error) = thread::Builder::new().name("measure".to_owned()).spawn(measure) {
             tracing::warn!(%error, "a finger's contact cannot be measured");
         }
     }
 
-    /// What takes the place of the fingers, each with its index; nothing has changed yet.
+    /// Reads every loaded finger anew. Returns what replaces each, with its index; nothing is
+    /// replaced yet.
     pub(super) fn renew_fingers(&self) -> Result<Vec<(usize, Next)>, ReloadError> {
         self.failed.forget();
         let mut all = Vec::new();
@@ -246,7 +248,7 @@ impl Reloader {
         Ok(Next::Renewed(Box::new(renewed), contact, Memory { files_bytes, ..old.memory }))
     }
 
-    /// Puts what [`renew_fingers`](Self::renew_fingers) made into its places; what has changed.
+    /// Puts what [`renew_fingers`](Self::renew_fingers) made into place. Returns what has changed.
     pub(super) fn put_fingers(&self, all: Vec<(usize, Next)>) -> BTreeMap<String, Changes> {
         let mut changed = BTreeMap::new();
         let mut named = self.named();
@@ -271,12 +273,12 @@ impl Reloader {
                 }
             }
         }
-        // Only whoever has the turn changes the list, so nothing came between.
+        // Only the holder of the turn changes the list, so nothing has changed it meanwhile.
         *self.named.write().unwrap_or_else(PoisonError::into_inner) = named;
         changed
     }
 
-    /// The folder of a finger's models; none of those in the binary.
+    /// The folder of a finger's models; None if they are embedded in the binary.
     pub(super) fn folder_of(&self, catalogue: &Catalogue) -> Option<PathBuf> {
         match catalogue.place {
             0 => self.config.models.clone(),

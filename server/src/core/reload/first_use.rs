@@ -22,7 +22,7 @@ use crate::{
     },
 };
 
-/// Why a tier does not answer.
+/// Why a tier's model cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum FirstUseError {
     #[error(transparent)]
@@ -34,12 +34,13 @@ pub(crate) enum FirstUseError {
 }
 
 impl Reloader {
-    /// Loads the model of the tier of this number, unless it is there, has failed a moment ago or the
-    /// drain has begun: reads it, holds it to its card and to its golden answers, measures it, and
-    /// hands every thread a warm session. Takes seconds; not for a thread that moves bytes.
+    /// Loads the model of the tier with this number if it is not loaded: reads it, checks it
+    /// against its card and its golden answers, times it, and hands a warm session to every thread.
+    /// This takes seconds, so it must not run on a worker thread of tokio.
     ///
     /// # Errors
-    /// It is unusable. Nothing has changed then: all other tiers answer as before.
+    /// The model is unusable, failed a moment ago, or the drain began. Nothing has changed then,
+    /// and all other tiers answer as before.
     pub(crate) fn load_first(&self, _turn: &Turn, number: usize) -> Result<(), Problem> {
         let (finger, place) = places(number);
         let Some(catalogue) = self.catalogue_at(finger) else { return Ok(()) };
@@ -69,11 +70,12 @@ impl Reloader {
         })
     }
 
-    /// Loads the model of the tier at `place`, one of so many, for the start, unless it is there or
-    /// the drain has begun. Waits for its turn; not within a runtime.
+    /// Loads the model of the default finger's tier at `place`, one of `of` that the start loads.
+    /// Does nothing if it is loaded or the drain has begun. It blocks until its turn, so it must
+    /// not be called on a worker thread of tokio.
     ///
     /// # Errors
-    /// It is unusable.
+    /// The model is unusable.
     pub(crate) fn load_at_start(&self, place: usize, of: usize) -> Result<(), StartError> {
         let _turn = Turn(Arc::clone(&self.turn).blocking_lock_owned());
         let catalogue = self.catalogue();
@@ -101,26 +103,29 @@ impl Reloader {
         let folder = self.folder_of(catalogue);
         let onnx = Assets::one(folder.as_deref(), &format!("{}.onnx", tier.name))?;
         let unusable = |error: &dyn std::fmt::Display| FirstUseError::Model(error.to_string());
-        // As it was when the tier was listed, which the file's hash has to be that of.
+        // The card as it was when the tier was listed; the file must have the hash that this card
+        // names.
         let card = ReadCard::parse(tier.card.to_string().as_bytes()).map_err(|e| unusable(&e))?;
         let states = catalogue.golden_states();
         let model = Loading::of(&self.config)
             .model(&tier.name, &onnx, &card.card, states, of)
             .map_err(|e| unusable(&e))?;
         drop(onnx);
-        // What the start loads is held to them where an engine is not the one that it was tried with.
+        // Of the models that the start loads, only those in ONNX Runtime by the operator's choice
+        // are checked here. With `Choice::Auto`, `Loading::model` has checked those that do not run
+        // in tract.
         if tier.on_demand || self.config.backend == Choice::Only(Backend::Ort) {
             golden::check(states, model.as_ref(), tier.relative_l2_p95)?;
         }
         if tier.on_demand && !self.config.calibration().is_zero() {
-            // The fewest runs there are: no budget picks it.
+            // Zero time means the fewest runs: no budget picks this tier.
             calibrate::measure(tier, model.as_ref(), Duration::ZERO)?;
         }
         let sessions = self.exchange.prepare_one(catalogue, place, model.as_ref())?;
-        // Threads first: whoever sees that it is loaded may submit a job at once.
+        // The threads come first: whoever sees that the tier is loaded may submit a job at once.
         self.exchange.hand_over(catalogue, sessions);
         tier.held.open(Arc::clone(&model));
-        // With its backend.
+        // The metrics name its backend from now on.
         self.name_tiers(&[]);
         let backend = &model.info().backend;
         tracing::info!(tier = tier.name, backend, on_demand = tier.on_demand, "loaded");

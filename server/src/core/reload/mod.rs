@@ -33,15 +33,16 @@ use crate::{
 };
 use fingers::Failed;
 
-/// Holds what there is to render with, loads the fingers that clients name, and reloads the models
-/// of a folder.
+/// Holds the catalogues in use, loads the fingers that clients name, and reloads the models of a
+/// folder.
 pub(crate) struct Reloader {
-    /// Held to take or put a pointer, for nothing else. A lock-free pointer would allocate when a
-    /// thread first reads it, which may be in the middle of a session's frames.
+    /// The default finger's catalogue. The lock is held only to copy or replace the pointer. A
+    /// lock-free pointer would allocate when a thread first reads it, which may be in the middle of
+    /// a session's frames.
     running: RwLock<Arc<Catalogue>>,
-    /// The fingers beside it, by their places from 1; held likewise.
+    /// The other fingers; the one at index i has place i + 1. The lock is held as briefly.
     named: RwLock<Vec<Named>>,
-    /// Those that could not be loaded a moment ago.
+    /// The fingers that could not be loaded a moment ago.
     failed: Failed,
     /// True once the server drains.
     drain: Arc<Sender<bool>>,
@@ -52,32 +53,32 @@ pub(crate) struct Reloader {
     turn: Arc<Mutex<()>>,
 }
 
-/// The turn of one reload or first use; the next begins when it is dropped.
+/// Permission for one reload or one first use. The next can begin when it is dropped.
 pub(crate) struct Turn(#[expect(dead_code, reason = "held, not read")] OwnedMutexGuard<()>);
 
 /// What a reload changed, by tier names.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Changes {
-    /// The tier clients get unasked.
+    /// The default tier.
     pub(crate) default: String,
     pub(crate) added: Vec<String>,
-    /// Same name, other file.
+    /// Tiers that kept their name and have another file.
     pub(crate) changed: Vec<String>,
     pub(crate) removed: Vec<String>,
     pub(crate) unchanged: Vec<String>,
-    /// The same of the fingers beside the default one.
+    /// The same for the fingers beside the default one, by name.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) fingers: BTreeMap<String, Changes>,
 }
 
-/// What takes the place of a catalogue.
+/// A catalogue that is ready to replace the old one, with the sessions of its new models.
 struct Renewed {
     catalogue: Arc<Catalogue>,
     sessions: Vec<Sessions>,
     changes: Changes,
 }
 
-/// Why nothing was changed.
+/// Why a reload changed nothing.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ReloadError {
     #[error(
@@ -137,16 +138,16 @@ impl Reloader {
         }
     }
 
-    /// What there is to render with now; it may be replaced at any time, so whoever needs it
-    /// twice keeps it.
+    /// The catalogue of the default finger now. A reload may replace it at any time, so a caller
+    /// that needs it twice keeps the pointer.
     pub(crate) fn catalogue(&self) -> Arc<Catalogue> {
         Arc::clone(&self.running.read().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The turn, if nothing is being loaded.
+    /// Takes the turn, if nothing is being loaded.
     ///
     /// # Errors
-    /// Something is, which is counted.
+    /// Something is being loaded. The metrics count this.
     pub(crate) fn try_begin(&self) -> Result<Turn, ReloadError> {
         Arc::clone(&self.turn).try_lock_owned().map(Turn).map_err(|_| {
             self.metrics.reload_busy();
@@ -154,18 +155,19 @@ impl Reloader {
         })
     }
 
-    /// The turn, once nothing is being loaded.
+    /// Waits for the turn.
     pub(crate) async fn begin(&self) -> Turn {
         Turn(Arc::clone(&self.turn).lock_owned().await)
     }
 
-    /// Loads the folder, checks every new model, hands the threads warm sessions of it and
-    /// then swaps the catalogue. Takes seconds, and ends early when the drain begins; not for a
-    /// thread that moves bytes.
+    /// Reads the folders, checks every new model, hands warm sessions to the threads, and then
+    /// replaces the catalogues. This takes seconds, so it must not run on a worker thread of tokio.
+    /// It ends early when the drain begins.
     ///
     /// # Errors
-    /// Anything that would keep the service from starting, a wrong golden answer, another
-    /// atlas, or the drain began; nothing has changed then.
+    /// Anything that would keep the service from starting, a wrong golden answer, another atlas, an
+    /// effect that an open session was promised and that is gone, or the drain began. Nothing has
+    /// changed then.
     pub(crate) fn reload(&self, _turn: Turn) -> Result<Changes, ReloadError> {
         let result = self.replace();
         self.metrics.reload(result.is_ok());
@@ -186,8 +188,8 @@ impl Reloader {
             None => None,
         };
         let fingers = self.renew_fingers()?;
-        // From here on nothing fails. Threads first: whoever reads a new catalogue may submit a job
-        // for a new tier at once.
+        // From here on nothing fails. The threads come first: whoever reads a new catalogue may
+        // submit a job for a new tier at once.
         let coming = fingers.iter().filter_map(|(_, next)| next.catalogue());
         let coming: Vec<_> = default.iter().map(|new| &new.catalogue).chain(coming).collect();
         self.name_tiers(&coming);
@@ -204,7 +206,7 @@ impl Reloader {
             },
         };
         changes.fingers = self.put_fingers(fingers);
-        // Those that are gone.
+        // A second time, so that the metrics learn which tiers are gone.
         self.name_tiers(&[]);
         Ok(changes)
     }
@@ -216,7 +218,8 @@ impl Reloader {
         self.renew(new, old)
     }
 
-    /// What takes the place of a catalogue: its new models are checked and measured, and warm.
+    /// Prepares the replacement of `old` by `new`: checks and times the new models, and makes warm
+    /// sessions of them.
     fn renew(&self, new: Catalogue, old: &Catalogue) -> Result<Renewed, ReloadError> {
         let go_on = || if self.is_draining() { Err(ReloadError::Draining) } else { Ok(()) };
         if new.atlas.hash() != old.atlas.hash() {
@@ -244,8 +247,8 @@ impl Reloader {
         Ok(Renewed { catalogue: Arc::new(new), sessions, changes })
     }
 
-    /// Tells the metrics which tiers there are, and which will be with the catalogues that come: before
-    /// these are there, so that not one frame goes uncounted.
+    /// Tells the metrics which tiers there are, including those of the catalogues that are
+    /// `coming`. This has to be done before those are in use, so that no frame goes uncounted.
     fn name_tiers(&self, coming: &[&Arc<Catalogue>]) {
         let (default, named) = (self.catalogue(), self.named());
         let running = named.iter().map(|named| (&named.loaded.catalogue, named.retired));
@@ -264,13 +267,13 @@ impl Reloader {
     }
 }
 
-/// Whether `old` has no such tier or another model under its name.
+/// Whether `old` has no tier of this name with this model.
 fn is_new(tier: &Tier, old: &Catalogue) -> bool {
     let same = |t: &&Tier| t.name == tier.name && Arc::ptr_eq(&t.held, &tier.held);
     old.tiers.iter().find(same).is_none()
 }
 
-/// Open sessions were told which effects they get.
+/// Requires that a tier which open sessions use still renders all effects that they were told of.
 fn keeps_promises(tier: &Tier, old: &Catalogue) -> Result<(), ReloadError> {
     let in_use = |t: &&Tier| t.name == tier.name && t.sessions.load(Ordering::Relaxed) > 0;
     let Some(before) = old.tiers.iter().find(in_use) else { return Ok(()) };
@@ -283,8 +286,8 @@ fn keeps_promises(tier: &Tier, old: &Catalogue) -> Result<(), ReloadError> {
     }
 }
 
-/// Puts the tiers of `new` where `old` has those of the same name, and new ones behind; what
-/// only `old` has stays in its place, retired.
+/// Orders the tiers of `new` so that each keeps the place it has in `old`; tiers with new names
+/// come last. Tiers that only `old` has stay in their places and are retired.
 fn succeed(mut new: Catalogue, old: &Catalogue) -> (Catalogue, Changes) {
     let default = new.tiers[new.default].name.clone();
     let mut coming = std::mem::take(&mut new.tiers);

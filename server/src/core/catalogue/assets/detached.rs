@@ -12,30 +12,31 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How often whoever waits looks whether to go on.
+/// How often the caller checks whether to go on waiting.
 const LOOK_AROUND: Duration = Duration::from_millis(50);
 
-/// Most readings that have been given up and hang still; then there are no more.
+/// The most abandoned threads that may hang at a time. Beyond that no new work is started.
 pub(super) const STRANDED_MAX: usize = 4;
 
 /// Why there is no result.
 #[derive(Debug)]
 pub(super) enum Unfinished {
-    /// It was to stop.
+    /// `is_to_stop` became true.
     Stopped,
-    /// It took too long.
+    /// It took longer than `wait_max`.
     Late,
-    /// Too many that were given up hang still.
+    /// Too many abandoned threads still hang.
     Stranded,
     /// Its thread could not be started, or panicked.
     Broken(io::Error),
 }
 
-/// Readings that were given up and hang still.
+/// Number of threads that were abandoned and still hang.
 static STRANDED: AtomicUsize = AtomicUsize::new(0);
 
-/// Does `work` on a thread of its own and waits for it, but not beyond `wait_max` or once it is to
-/// stop. What is given up then goes on by itself; the end of the process does not wait for it.
+/// Runs `work` on a thread of its own and waits for it, until `wait_max` has passed or `is_to_stop`
+/// is true. A thread that is abandoned then goes on by itself; the end of the process does not wait
+/// for it.
 pub(super) fn detached<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
     wait_max: Duration,
@@ -50,7 +51,7 @@ pub(super) fn detached<T: Send + 'static>(
     let begun = Instant::now();
     let thread = thread::Builder::new().name("papilla-read".to_owned()).spawn(move || {
         let _end = end;
-        // Err: nobody waits any more.
+        // Fails if the caller has stopped waiting.
         let _ = done.send(work());
     });
     thread.map_err(Unfinished::Broken)?;
@@ -72,7 +73,7 @@ pub(super) fn detached<T: Send + 'static>(
     Err(fault)
 }
 
-/// The end of a reading's thread, however it comes.
+/// Marks the end of the thread when it is dropped, also by a panic.
 struct End(Arc<AtomicBool>);
 
 impl Drop for End {
@@ -81,8 +82,8 @@ impl Drop for End {
     }
 }
 
-/// Called by the thread that ends and by whoever gives it up and has counted it: the second of the
-/// two takes it off the count.
+/// Called twice for abandoned work: by the thread when it ends, and by the caller when it has
+/// counted the thread as hanging. The second call takes the thread off the count.
 fn take_off(over: &AtomicBool) {
     if over.swap(true, Ordering::AcqRel) {
         STRANDED.fetch_sub(1, Ordering::Relaxed);

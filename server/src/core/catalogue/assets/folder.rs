@@ -19,14 +19,15 @@ use super::{
 };
 use crate::StartError;
 
-/// Most bytes of one file.
+/// Largest file that is read, bytes.
 const FILE_BYTES_MAX: u64 = 256 << 20;
-/// Most bytes of all files that are read of a folder of models.
+/// The most that is read of one folder of models, bytes.
 pub(super) const FOLDER_BYTES_MAX: u64 = 1 << 30;
 /// Longest time for reading the folder.
 const WAIT_MAX: Duration = Duration::from_secs(20);
 
-/// The files of every service; an index names the models beside them.
+/// Files that are read if the folder has them. `index.json` names the models that are read beside
+/// them.
 const BASE: [&str; 9] = [
     "index.json",
     "atlas.json",
@@ -39,21 +40,22 @@ const BASE: [&str; 9] = [
     SKIN,
 ];
 
-/// What there is in a folder.
+/// What was found in a folder.
 #[derive(Debug)]
 pub(super) struct Found {
     pub(super) files: Files,
-    /// Names of files that were not read: of models that are loaded on demand.
+    /// Names of files that were left unread: networks that are loaded on demand.
     pub(super) unread: Vec<String>,
 }
 
-/// The files of `folder` that a service is made of: [`BASE`] and those of the models that its index
-/// names, but for the networks of models to be loaded on demand. Strangers that cannot be read are
-/// named in the log. None: it was to stop.
+/// Reads the files of `folder` that a service needs: [`BASE`], and the cards and networks of the
+/// models that its index names. Networks that are loaded on demand are listed and not read. A file
+/// that belongs to no model and cannot be opened is named in the log. None: `is_to_stop` became
+/// true.
 ///
 /// # Errors
-/// The folder or one of these files cannot be read, is no file, not read in time, or all of them
-/// have more than `bytes_max`.
+/// The folder or one of these files cannot be read, is not a regular file, or is not read in time;
+/// or all of them together have more than `bytes_max`.
 pub(super) fn read(
     folder: &Path,
     bytes_max: u64,
@@ -62,11 +64,11 @@ pub(super) fn read(
     in_time(folder, bytes_max, is_to_stop, |folder| folder.read())
 }
 
-/// The folders within `folder` that hold a file called [`FINGER`], by name; those whose names are not
-/// UTF-8 are passed over.
+/// The names, sorted, of the folders within `folder` that hold a file called [`FINGER`]. Names that
+/// are not UTF-8 are left out.
 ///
 /// # Errors
-/// It cannot be read, or not in time.
+/// The folder cannot be read, or not in time.
 pub(super) fn fingers(folder: &Path) -> Result<Vec<String>, StartError> {
     let list = |folder: Folder<'_>| {
         let unreadable = |source| StartError::Folder { folder: folder.path.to_owned(), source };
@@ -82,14 +84,14 @@ pub(super) fn fingers(folder: &Path) -> Result<Vec<String>, StartError> {
         names.sort_unstable();
         Ok(names)
     };
-    // Never stopped, so there always is a list.
+    // Nothing stops it, so there always is a list.
     in_time(folder, 0, &|| false, list).map(Option::unwrap_or_default)
 }
 
-/// The bytes of one file of `folder`; none if there is none.
+/// The bytes of one file of `folder`. None: the folder has no such file.
 ///
 /// # Errors
-/// It cannot be read, is no file, too large, or not read in time.
+/// The file cannot be read, is not a regular file, is too large, or is not read in time.
 pub(super) fn read_one(folder: &Path, name: &str) -> Result<Option<Vec<u8>>, StartError> {
     let name = name.to_owned();
     let one = move |mut folder: Folder<'_>| {
@@ -99,7 +101,7 @@ pub(super) fn read_one(folder: &Path, name: &str) -> Result<Option<Vec<u8>>, Sta
     in_time(folder, FILE_BYTES_MAX, &|| false, one).map(Option::flatten)
 }
 
-/// Reads from a folder, within a time; none if it was to stop.
+/// Reads from a folder within [`WAIT_MAX`]. None: `is_to_stop` became true.
 fn in_time<T: Send + 'static>(
     folder: &Path,
     bytes_max: u64,
@@ -110,7 +112,8 @@ fn in_time<T: Send + 'static>(
     let at = Arc::new(Mutex::new(None));
     let (place, progress) = (folder.to_owned(), Arc::clone(&at));
     let reading = move || {
-        // Resolved once: a link that is turned meanwhile must not mix two folders.
+        // The path is resolved once: if a symbolic link is changed meanwhile, files of two folders
+        // must not be mixed.
         let place = fs::canonicalize(&place)
             .map_err(|source| StartError::Folder { folder: place.clone(), source })?;
         read(Folder { path: &place, bytes_max, left: bytes_max, at: &progress, files: Vec::new() })
@@ -139,11 +142,11 @@ fn in_time<T: Send + 'static>(
 /// A folder that is being read.
 struct Folder<'a> {
     path: &'a Path,
-    /// Bytes that all its files may have.
+    /// The most that all its files together may have, bytes.
     bytes_max: u64,
     /// Bytes that may still be read.
     left: u64,
-    /// The file that is being read.
+    /// The file that is being read, for the message if that takes too long.
     at: &'a Mutex<Option<String>>,
     files: Files,
 }
@@ -180,7 +183,7 @@ impl Folder<'_> {
         Ok(Found { files: self.files, unread })
     }
 
-    /// The index; none if it is missing or damaged, which is found later.
+    /// The index. None: it is missing or damaged, which loading reports later.
     fn index(&self) -> Option<Index> {
         let (_, bytes) = self.files.iter().find(|(name, _)| name == "index.json")?;
         Index::from_json(json::text(bytes).ok()?).ok()
@@ -190,7 +193,7 @@ impl Folder<'_> {
     fn take(&mut self, name: &str, listed: &HashSet<String>) -> Result<(), StartError> {
         let path = self.path.join(name);
         *self.at.lock().unwrap_or_else(PoisonError::into_inner) = Some(name.to_owned());
-        // A link to nothing is a file that is missing.
+        // A dangling symbolic link counts as a missing file.
         if !listed.contains(name) || matches!(path.try_exists(), Ok(false)) {
             return Ok(());
         }
@@ -215,7 +218,7 @@ impl Folder<'_> {
             return Err(too_large(data.len()));
         }
         let mut bytes = Vec::with_capacity(usize::try_from(data.len()).unwrap_or_default());
-        // It may grow meanwhile.
+        // The file may grow while it is read.
         file.take(most + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
         if bytes.len() as u64 > most {
             return Err(too_large(bytes.len() as u64));
@@ -249,7 +252,8 @@ fn names(folder: &Path) -> io::Result<HashSet<String>> {
     Ok(names)
 }
 
-/// Opens a file that is one; what else lies there could keep whoever opens it for ever.
+/// Opens a regular file. Anything else is refused before it is opened, since opening a named pipe,
+/// for example, may never return.
 fn open(path: &Path) -> Result<(File, Metadata), String> {
     let data = fs::metadata(path).map_err(|error| error.to_string())?;
     if !data.is_file() {
@@ -257,7 +261,7 @@ fn open(path: &Path) -> Result<(File, Metadata), String> {
     }
     let file = File::open(path).map_err(|error| error.to_string())?;
     let data = file.metadata().map_err(|error| error.to_string())?;
-    // Something else may have taken its place.
+    // Something else may have taken its place since.
     if !data.is_file() {
         return Err(format!("it is {}, no file", kind(data.file_type())));
     }

@@ -13,24 +13,24 @@ use papilla_session_contact::{AssetsError, ContactAssets};
 
 use crate::{StartError, config::Config};
 
-/// The contact model's file among the others.
+/// File of the contact model.
 pub(crate) const CONTACT: &str = "finger.contact";
-/// What a finger is made of; the file by which its folder is known.
+/// Description of a finger. A folder that holds this file is a finger's.
 pub(crate) const FINGER: &str = "finger.toml";
-/// Most bytes of all files of a finger's folder that are read.
+/// The most that is read of one finger's folder, bytes.
 pub(crate) const FINGER_FILES_BYTES_MAX: u64 = 256 << 20;
-/// The offset of its skin from the template, if it has one.
+/// Offset of the finger's skin from the template; optional.
 pub(crate) const SKIN: &str = "skin.json";
-/// What methods err with it.
+/// Errors of the contact methods with this contact model.
 pub(crate) const CONTACT_ERRORS: &str = "contact.json";
 
-/// By what the errors of answers are told.
+/// The laws by which the error of an answer is estimated.
 pub(crate) const ERROR_LAWS: &str = "errors.json";
 
 /// The shipped models, cards, atlas, replay and contact model, as they were when the binary was built.
 const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
-/// The origin of those.
+/// How messages name the origin of the embedded files.
 const EMBEDDED: &str = "the binary";
 
 const FINGER_ADVICE: &str = "the folder of a finger holds finger.toml, index.json, atlas.json, and \
@@ -42,12 +42,13 @@ type Files = Vec<(String, Cow<'static, [u8]>)>;
 /// The files of a model folder by name.
 #[derive(Debug)]
 pub(crate) struct Assets {
-    /// Where they are from, for messages.
+    /// Where the files are from, for messages.
     pub(crate) origin: String,
-    /// What to do if one is missing.
+    /// What a message advises if a file is missing.
     advice: &'static str,
     files: Files,
-    /// The folder, and names of files there that were not read: of models to be loaded on demand.
+    /// The folder, and the names of its files that were not read because they are loaded on demand.
+    /// None: the files are embedded.
     unread: Option<(PathBuf, Vec<String>)>,
 }
 
@@ -57,11 +58,11 @@ impl Assets {
     /// # Errors
     /// The folder or one of its files cannot be read.
     pub(crate) fn of(config: &Config) -> Result<Self, StartError> {
-        // Never stopped, so there always are some.
+        // Nothing stops it, so there always is a result.
         Self::of_unless(config, &|| false).map(|assets| assets.unwrap_or_else(Self::embedded))
     }
 
-    /// The same, given up once it is to stop: None then.
+    /// As [`of`](Self::of), but gives up once `is_to_stop` is true; the result is None then.
     ///
     /// # Errors
     /// As [`of`](Self::of).
@@ -74,7 +75,7 @@ impl Assets {
         Ok(read.map(|folder::Found { files, unread }| Self::of_folder(folder, files, unread)))
     }
 
-    /// The files of a finger's folder; given up once it is to stop: None then.
+    /// The files of a finger's folder. None: `is_to_stop` became true.
     ///
     /// # Errors
     /// The folder or one of its files cannot be read.
@@ -88,10 +89,10 @@ impl Assets {
         Ok(assets.map(|assets| Self { advice: FINGER_ADVICE, ..assets }))
     }
 
-    /// The names of the fingers in a folder: of each folder in it that holds [`FINGER`].
+    /// The names of the fingers in a folder: each folder in it that holds [`FINGER`] is one.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// The folder cannot be read.
     pub(crate) fn fingers(folder: &Path) -> Result<Vec<String>, StartError> {
         folder::fingers(folder)
     }
@@ -101,10 +102,10 @@ impl Assets {
         self.files.iter().map(|(_, bytes)| bytes.len() as u64).sum()
     }
 
-    /// One file of a folder, or else of those built into the binary, without the others.
+    /// One file, read alone: from `folder`, or embedded if there is no folder.
     ///
     /// # Errors
-    /// There is none, or it cannot be read.
+    /// There is no such file, or it cannot be read.
     pub(crate) fn one(folder: Option<&Path>, file: &str) -> Result<Cow<'static, [u8]>, StartError> {
         let assets = match folder {
             Some(folder) => Self::of_folder(folder, Vec::new(), vec![file.to_owned()]),
@@ -113,7 +114,7 @@ impl Assets {
         assets.model(file).map(|bytes| Cow::Owned(bytes.into_owned()))
     }
 
-    /// Where the files are from that `config` names, for messages.
+    /// Where the files that `config` names are from, for messages.
     pub(crate) fn origin(config: &Config) -> String {
         match &config.models {
             Some(folder) => folder.display().to_string(),
@@ -143,20 +144,20 @@ impl Assets {
         }
     }
 
-    /// Requires that there is a file called `name`, read or not.
+    /// Requires that there is a file called `name`, whether it was read or not.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no such file.
     pub(crate) fn require_there(&self, name: &str) -> Result<(), StartError> {
         let is_unread =
             self.unread.iter().any(|(_, unread)| unread.iter().any(|unread| unread == name));
         if is_unread { Ok(()) } else { self.require(name).map(|_| ()) }
     }
 
-    /// The bytes of a model's file; one that was not read is read now.
+    /// The bytes of a model's file. If it was left unread, it is read now.
     ///
     /// # Errors
-    /// There is none, or it cannot be read.
+    /// There is no such file, or it cannot be read.
     pub(crate) fn model(&self, name: &str) -> Result<Cow<'_, [u8]>, StartError> {
         if let Some((folder, unread)) = &self.unread
             && unread.iter().any(|unread| unread == name)
@@ -167,9 +168,10 @@ impl Assets {
         self.require(name).map(Cow::Borrowed)
     }
 
-    /// Refuses a contact model that was made before the finger's description in this folder was changed:
-    /// its atlas may be the same, since bone and tissues do not show there. Without a description there
-    /// is nothing to compare with.
+    /// Refuses a contact model that was made from another description of the finger than the one in
+    /// this folder. The hash of the atlas cannot show this, since bone and tissues are not in the
+    /// atlas. If the folder or the contact model has no description, there is nothing to compare,
+    /// and the contact model is accepted.
     ///
     /// # Errors
     /// [`AssetsError`].
@@ -182,7 +184,7 @@ impl Assets {
     /// The bytes of the file called `name`.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no such file.
     pub(crate) fn require(&self, name: &str) -> Result<&[u8], StartError> {
         self.get(name).ok_or_else(|| StartError::Missing {
             file: name.to_owned(),

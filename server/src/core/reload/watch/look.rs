@@ -7,12 +7,12 @@ use std::{
     time::SystemTime,
 };
 
-/// The state of a folder at one look.
+/// What a folder held at one moment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Look {
-    /// Where the path leads, links followed.
+    /// The path with symbolic links resolved.
     pub(super) folder: PathBuf,
-    /// Its files by name, and those of the folders in it.
+    /// The entries of the folder and of the folders directly in it, sorted by path.
     files: Vec<File>,
 }
 
@@ -21,21 +21,22 @@ struct File {
     path: PathBuf,
     bytes: u64,
     modified: Option<SystemTime>,
-    /// Device and number: another file under the same name.
+    /// Numbers of device and inode, which tell another file under the same name.
     place: (u64, u64),
 }
 
 impl Look {
-    /// Looks where `path` leads now. A link inside the folder counts as what it leads to.
+    /// Looks at the folder that `path` leads to now. Symbolic links inside it count as what they
+    /// lead to.
     ///
     /// # Errors
-    /// There is no folder, or it cannot be read.
+    /// There is no such folder, or it cannot be read.
     pub(super) fn at(path: &Path) -> io::Result<Self> {
         let folder = fs::canonicalize(path)?;
         let mut files = Vec::new();
         let inner = look_into(&folder, &mut files)?;
         for folder in inner {
-            // Err: it has gone meanwhile, or is not to be read.
+            // A folder in it that has gone meanwhile, or cannot be read, is left out.
             let _ = look_into(&folder, &mut files);
         }
         files.sort_unstable();
@@ -43,12 +44,12 @@ impl Look {
     }
 }
 
-/// Adds what lies in a folder; the folders among it.
+/// Adds the entries of a folder to `files`. Returns the folders among them.
 fn look_into(folder: &Path, files: &mut Vec<File>) -> io::Result<Vec<PathBuf>> {
     let mut inner = Vec::new();
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        // A link to nothing is a file that is missing.
+        // A dangling symbolic link counts as a missing file.
         let Ok(data) = fs::metadata(&path) else { continue };
         if data.is_dir() {
             inner.push(path.clone());

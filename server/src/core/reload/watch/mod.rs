@@ -14,18 +14,20 @@ use tokio::{
 use super::{Reloader, Turn};
 use crate::drain::begun;
 
-/// A folder must be quiet for so long: files are copied one after the other.
+/// How long nothing may change in a folder before it is read, since files are copied one after
+/// another.
 const QUIET: Duration = Duration::from_millis(700);
 
-/// A folder that never gets quiet is read after so long all the same.
+/// After this time a folder is read even if it goes on changing.
 const WAIT_MAX: Duration = Duration::from_secs(10);
 
-/// Watches where `folder` leads until the drain begins.
+/// Watches the folder that the path `folder` leads to, until the drain begins.
 ///
 /// # Errors
-/// The thread that looks cannot be started.
+/// The watching thread cannot be started.
 pub(crate) fn watch(reloader: Arc<Reloader>, folder: &Path) -> io::Result<()> {
-    // One place is enough: it says that something has changed since it was last emptied.
+    // A capacity of one is enough: a message means that something has changed since the last one
+    // was received.
     let (changed, changes) = mpsc::channel(1);
     let (looking, stop) = threads::channel();
     notice::start(folder, changed, Arc::clone(&reloader.metrics), stop)?;
@@ -39,7 +41,7 @@ async fn follow(
     looking: threads::Sender<()>,
 ) {
     loop {
-        // Held no longer than the wait: a drain waits for whoever holds one.
+        // Dropped right after the wait, since a drain waits until nobody holds a receiver.
         let mut drain = reloader.drain.subscribe();
         tokio::select! {
             () = begun(&mut drain) => break,
@@ -52,21 +54,21 @@ async fn follow(
         {}
         once(Arc::clone(&reloader)).await;
     }
-    // The thread that looks ends with it.
+    // This ends the watching thread.
     drop(looking);
 }
 
-/// Loads the models anew once it is its turn, unless the drain begins before. What came of it is in
-/// the log and in the metrics.
+/// Reloads the models when it is its turn, unless the drain begins before. The result is in the log
+/// and in the metrics.
 pub(crate) async fn once(reloader: Arc<Reloader>) {
     if let Some(turn) = turn(&reloader).await {
-        // Err: it panicked, and the log says so.
+        // Fails if the reload panicked, which the log shows.
         let _ = spawn_blocking(move || reloader.reload(turn)).await;
     }
 }
 
-/// The turn to reload: the one under way may have read the folder before it changed. None: the
-/// drain began.
+/// Waits for the turn to reload. A reload that is under way may have read the folder before it
+/// changed, so another follows. None: the drain began.
 async fn turn(reloader: &Reloader) -> Option<Turn> {
     match reloader.try_begin() {
         Ok(turn) => Some(turn),

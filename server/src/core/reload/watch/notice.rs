@@ -21,12 +21,13 @@ use tokio::sync::mpsc::Sender;
 
 use super::look::Look;
 
-/// Time between two looks of our own.
+/// Time between two looks at the folder, which find what the file system does not report.
 const LOOK_EVERY: Duration = Duration::from_secs(3);
 
-/// Starts to look at where `path` leads, until `stop` is dropped. Each change is told by `changed`.
+/// Starts to watch the folder that `path` leads to, until `stop`'s sender is dropped. Each change
+/// is sent to `changed`.
 ///
-/// On a thread of its own: a drive that does not answer keeps it, and nothing else.
+/// This runs on a thread of its own, so that a drive that does not answer blocks nothing else.
 ///
 /// # Errors
 /// The thread cannot be started.
@@ -51,14 +52,15 @@ pub(super) fn start(
     Ok(())
 }
 
-/// What the last look saw, and what is told by the file system meanwhile.
+/// What the last look found, and what the file system has reported since.
 struct Noticing {
     path: PathBuf,
     last: Option<Look>,
     changed: Sender<()>,
-    /// Whether the file system has told of a change since the last look.
+    /// Whether the file system has reported a change since the last look.
     was_told: Arc<AtomicBool>,
-    /// Tells of the folder itself, and of the link that leads there; none where it cannot.
+    /// Reports changes of the folder and of the link that leads there; None if the file system
+    /// cannot.
     watcher: Option<RecommendedWatcher>,
 }
 
@@ -71,10 +73,11 @@ impl Noticing {
         noticing
     }
 
-    /// Resolves the path again; tells of a change that the file system has not told of.
+    /// Resolves the path again and looks. Sends a change that the file system has not reported.
     fn look(&mut self) {
         let was_told = self.was_told.swap(false, Ordering::AcqRel);
-        // A folder that is gone for now, as while a link is turned, is looked at again.
+        // A folder may be missing for a moment, as while a link is replaced; the next look finds
+        // it.
         let Ok(look) = Look::at(&self.path) else { return };
         if self.last.as_ref() == Some(&look) {
             return;
@@ -89,7 +92,7 @@ impl Noticing {
         }
     }
 
-    /// Asks the file system to tell of changes in the folder where the path leads now.
+    /// Asks the file system to report changes in the folder that the path leads to now.
     fn watch(&mut self) {
         self.watcher = None;
         let Some(look) = &self.last else { return };
@@ -112,7 +115,7 @@ fn watcher(
     let link = path.file_name().map(ToOwned::to_owned);
     let inside = folder.to_owned();
     let mut watcher = notify::recommended_watcher(move |event: notify::Result<Event>| {
-        // An error is a lost event: better to look.
+        // After an error events may be lost, so it counts as a change.
         let is_ours = event.map_or(true, |event| {
             let is_there =
                 |path: &PathBuf| path.starts_with(&inside) || path.file_name() == link.as_deref();
@@ -120,13 +123,14 @@ fn watcher(
         });
         if is_ours {
             was_told.store(true, Ordering::Release);
-            // One place is enough: it says that something has changed since it was last emptied.
+            // A capacity of one is enough: a message means that something has changed since the
+            // last one was received.
             let _ = changed.try_send(());
         }
     })?;
     watcher.watch(folder, RecursiveMode::NonRecursive)?;
-    // Of the folder that holds the link, only the link counts. Err: it may not be read, and our own
-    // looks find it.
+    // In the folder that holds the link, only the link counts. If that folder cannot be watched,
+    // the regular looks find a changed link.
     if let Some(parent) = path.parent() {
         let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
         if watcher.watch(parent, RecursiveMode::NonRecursive).is_err() {
@@ -136,7 +140,7 @@ fn watcher(
     Ok(watcher)
 }
 
-/// Reading a file is an event too, and a reload reads them all.
+/// Whether an event is a change. Reading a file is an event too, and a reload reads all files.
 fn is_change(kind: EventKind) -> bool {
     match kind {
         EventKind::Access(kind) => matches!(kind, AccessKind::Close(AccessMode::Write)),
