@@ -31,25 +31,26 @@ use crate::{
     transport::{app::App, gate::Key, room, stream::TimeoutStream},
 };
 
-/// The connection and what it takes to speak over it.
+/// The connection, with its buffers, timers and limits.
 pub(super) struct Connection {
     stream: Stream,
     pub(super) inbound: Inbound,
     pub(super) reply: Arc<Reply>,
     pub(super) app: Arc<App>,
-    /// Whose connection it is, if that is known.
+    /// The client that the connection belongs to; None if it is not known.
     pub(super) client: Option<Key>,
     drain: watch::Receiver<bool>,
-    /// When the client's last message came, and whether it was pinged since.
+    /// When the client's last message came, and whether a ping was sent since.
     heard: TokioInstant,
     is_pinged: bool,
-    /// Goes off when a ping or the end may be due.
+    /// Fires when it is time to look whether the client has to be pinged or given up.
     alarm: Pin<Box<Sleep>>,
-    /// Goes off when the session is to be asked to move, or has had its time to.
+    /// Fires at the time of the next [`Event::Due`]: the session is to be asked to move, or its
+    /// time to do so has passed. Only valid while `is_due_set`.
     due: Pin<Box<Sleep>>,
     is_due_set: bool,
     limits: Limits,
-    /// Goes off when the next turn begins.
+    /// Fires when the session may read again after it has used up its turn.
     pause: Pin<Box<Sleep>>,
 }
 
@@ -58,7 +59,7 @@ enum Stream {
     Tls(Box<TokioIo<Upgraded>>),
 }
 
-/// What a session waits for.
+/// What a session has waited for.
 #[derive(Debug)]
 pub(super) enum Event {
     Text(Bytes),
@@ -67,11 +68,11 @@ pub(super) enum Event {
     Draining,
     /// An accepted frame may have been answered.
     Settled,
-    /// The time that was set has come.
+    /// The time set by [`Connection::call_after`] has come.
     Due,
 }
 
-/// What a session waits for beside messages.
+/// Which events a session waits for beside messages and the timer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wait {
     /// The beginning of the drain.
@@ -124,7 +125,7 @@ impl Connection {
         }
     }
 
-    /// Sets the time of the next [`Event::Due`]; none: there is none.
+    /// Sets when the next [`Event::Due`] comes; None: there will be none.
     pub(super) fn call_after(&mut self, wait: Option<Duration>) {
         self.is_due_set = wait.is_some();
         if let Some(wait) = wait {
@@ -132,11 +133,11 @@ impl Connection {
         }
     }
 
-    /// The next event. A silent client is pinged after a third of the idle time,
-    /// and given up after all of it.
+    /// Waits for the next event. A silent client is pinged after a third of the idle time, and the
+    /// session ends after all of it.
     ///
-    /// **Invariant:** between two waits, no more than a turn's worth of frames and bytes is worked
-    /// off ([`Limits`]), so that one client's flood does not hold a thread up for others.
+    /// **Invariant:** between two waits it handles no more than a turn's worth of frames and bytes
+    /// ([`Limits`]), so that a flood from one client does not keep the thread from others.
     pub(super) async fn next(&mut self, wait: Wait) -> Result<Event, End> {
         loop {
             self.flush().await?;
@@ -181,14 +182,14 @@ impl Connection {
                 }
                 () = &mut self.alarm => self.on_idle()?,
                 () = &mut self.pause, if resume_at.is_some() => {}
-                // In a future of its own: room is made only where there will be a read.
+                // Inside the future, so that room is made only if this branch is enabled.
                 read = async { self.stream.read(self.inbound.room()).await },
                     if resume_at.is_none() => self.on_read(read)?,
             }
         }
     }
 
-    /// Handles a message; an event if the session has to act on it.
+    /// Handles a message. Some: the session has to act on it.
     fn on_message(&mut self, message: Message) -> Result<Option<Event>, End> {
         let received = Instant::now();
         (self.heard, self.is_pinged) = (received.into(), false);
@@ -222,7 +223,10 @@ impl Connection {
         self.limits.on_control().map_err(|problem| End::Refused(problem, close::POLICY))
     }
 
-    /// Counts a read; the end of the session if the connection has ended.
+    /// Counts a read.
+    ///
+    /// # Errors
+    /// The connection has ended, with the reason.
     fn on_read(&mut self, read: io::Result<usize>) -> Result<(), End> {
         match read {
             Ok(0) if self.inbound.is_amid() => {
@@ -237,7 +241,7 @@ impl Connection {
         }
     }
 
-    /// Pings a client that is silent, and ends the session of one that stays so.
+    /// Pings a silent client, and ends the session if it stays silent.
     fn on_idle(&mut self) -> Result<(), End> {
         let idle = self.app.timeouts.idle;
         let silence = self.heard.elapsed();
@@ -254,7 +258,8 @@ impl Connection {
         Ok(())
     }
 
-    /// Waits for work that the client has asked for; given up with the client.
+    /// Waits for work that the client has asked for. It is dropped, with an error, if the client
+    /// leaves.
     pub(super) async fn while_there<T>(&mut self, work: impl Future<Output = T>) -> Result<T, End> {
         tokio::select! {
             biased;
@@ -268,11 +273,11 @@ impl Connection {
         }
     }
 
-    /// Writes what is left, as long as the client reads: it may take a while for the first byte and
-    /// for each that follows, and as long as it needs for all.
+    /// Writes all messages that are left. There is no limit for the whole, but the connection
+    /// counts as broken if the client reads no byte for `timeouts.io`.
     pub(super) async fn flush(&mut self) -> Result<(), End> {
         let out = &self.reply.out;
-        // Nearly always there is nothing left, and no clock to be set.
+        // Nearly always nothing is left, and no timer needs to be set.
         if out.go_on(false).map_err(End::Broken)?.is_all {
             return Ok(());
         }
@@ -282,7 +287,8 @@ impl Connection {
                 let wait_max = self.app.timeouts.io;
                 let mut read = Instant::now();
                 loop {
-                    // Err: there may be less room than the system wakes anybody for.
+                    // On a timeout the system may have some room, but too little for it to report
+                    // the socket writable.
                     let woken = timeout(room::pause(wait_max), stream.writable()).await;
                     let insist = woken.is_err();
                     woken.unwrap_or(Ok(())).map_err(broken)?;
@@ -297,7 +303,7 @@ impl Connection {
                     }
                 }
             }
-            // The stream below the cipher times its writes the same way.
+            // The stream below TLS limits its writes in the same way.
             Stream::Tls(stream) => {
                 while let Some(message) = out.take() {
                     stream.write_all(&message).await.map_err(broken)?;
@@ -307,11 +313,12 @@ impl Connection {
         }
     }
 
-    /// Says why the session ends, closes, and waits a moment for the client to close too.
+    /// Tells the client why the session ends, sends the close frame, and waits a moment for the
+    /// client to close too.
     pub(super) async fn close(&mut self, end: &End) {
         let (code, reason) = match end {
             End::Broken(_) => return,
-            // There may be nobody left to read it.
+            // The client may have gone already.
             End::Garbled(_) => (close::PROTOCOL, "what came is not WebSocket"),
             End::Client(code) => (code.unwrap_or(close::NORMAL), ""),
             End::Refused(problem, code) => {
@@ -327,8 +334,8 @@ impl Connection {
         if self.flush().await.is_err() || matches!(end, End::Client(_)) {
             return;
         }
-        // Read, and not understood: a connection that is dropped with bytes unread is reset, and
-        // the client may never see what it was told.
+        // What still comes is read and dropped. If a socket is closed with unread bytes, the system
+        // resets the connection, and the client may never see why the session ended.
         let mut unread = BytesMut::with_capacity(FAREWELL_ROOM);
         let farewell = async {
             while let Ok(1..) = self.stream.read(&mut unread).await {
@@ -336,31 +343,32 @@ impl Connection {
                 sleep(FAREWELL_PAUSE).await;
             }
         };
-        // Err: the client does not close.
+        // Fails if the client does not close in time.
         let _ = timeout(FAREWELL, farewell).await;
     }
 }
 
-/// Time between two looks at whether a client is still there, and bytes read meanwhile where they
-/// have to be read for that.
+/// Time between two checks whether a client is still connected, and the most bytes that may be read
+/// ahead meanwhile where a check has to read.
 const LOOK: Duration = Duration::from_millis(50);
 const AHEAD_MAX: usize = 256 * 1024;
 
-/// Longest wait for the client's own close; room to read until then, bytes, and the pause between
-/// two reads: a client that goes on sending is listened to at 8 MB/s.
+/// Longest wait for the client's own close; size of the buffer that is read into until then, bytes;
+/// and the pause between two reads, which limits a client that goes on sending to 8 MB/s.
 const FAREWELL: Duration = Duration::from_secs(1);
 const FAREWELL_ROOM: usize = 16 * 1024;
 const FAREWELL_PAUSE: Duration = Duration::from_millis(2);
 
 impl Stream {
-    /// Waits until the client sends nothing more, or the connection breaks; for ever, as a rule.
-    /// What it sends meanwhile waits, in the system's room or in `inbound`.
+    /// Waits until the client has closed its side, or the connection breaks; as a rule neither
+    /// happens. None: it has closed. What it sends meanwhile stays in the system's buffer, or goes
+    /// into `inbound` where only a read can tell.
     async fn left(&mut self, inbound: &mut Inbound) -> Option<io::Error> {
         let mut ahead = 0;
         loop {
             sleep(LOOK).await;
             match self {
-                // Err: there is nothing to be read.
+                // A timeout means that there is nothing to read.
                 Self::Plain(stream) => {
                     match timeout(LOOK, stream.ready(Interest::READABLE)).await {
                         Ok(Ok(ready)) if ready.is_read_closed() => return None,
@@ -368,7 +376,7 @@ impl Stream {
                         Ok(Ok(_)) | Err(_) => {}
                     }
                 }
-                // Only a read tells, behind the cipher.
+                // With TLS only a read shows whether the client has closed.
                 Self::Tls(_) if ahead >= AHEAD_MAX => {}
                 Self::Tls(stream) => match stream.read_buf(inbound.room()).await {
                     Ok(0) => return None,
@@ -379,7 +387,8 @@ impl Stream {
         }
     }
 
-    /// Reads some bytes behind those of `buffer`; nothing is lost if it is dropped while it waits.
+    /// Appends the bytes that have arrived to `buffer`. It is cancel safe: nothing is lost if the
+    /// future is dropped while it waits.
     async fn read(&mut self, buffer: &mut BytesMut) -> io::Result<usize> {
         match self {
             Self::Plain(stream) => loop {

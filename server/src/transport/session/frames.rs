@@ -39,11 +39,11 @@ pub(super) struct Session {
     pub(super) number: u64,
     pub(super) terms: Terms,
     lanes: Vec<Lane>,
-    /// What its frames cost: all fingers have the turns of one session.
+    /// The account that its frames are charged to. All its fingers share the turns of one session.
     account: Arc<Account>,
 }
 
-/// The way of one finger's frames.
+/// The slot of one finger, and what tells its stale frames.
 struct Lane {
     fresh: Freshness,
     slot: Arc<Slot>,
@@ -59,7 +59,8 @@ enum Phase {
     Draining,
 }
 
-/// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
+/// Serves the session until one side ends it. Before a drain ends it, every accepted frame is
+/// answered.
 pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> End {
     let (mut phase, mut is_seal_due) = (Phase::Open, false);
     session.set_stay(connection);
@@ -126,7 +127,7 @@ impl Session {
         session
     }
 
-    /// Begins anew on the terms; slots are kept, so that answers stay in order.
+    /// Applies the terms. Slots that exist are kept, so that answers stay in order.
     fn open_lanes(&mut self, connection: &Connection) {
         let fresh = || Freshness::new(self.terms.stale_after_us);
         for lane in &mut self.lanes {
@@ -141,7 +142,8 @@ impl Session {
         }
     }
 
-    /// Takes a hello for new terms, such as another tier.
+    /// Handles a hello for new terms, such as another tier. If it cannot be met, the old terms
+    /// stand.
     async fn renew(&mut self, connection: &mut Connection, said: hello::Said) -> Result<(), End> {
         match hello::renew(connection, said, self.number).await? {
             Ok((terms, ready)) => {
@@ -157,18 +159,19 @@ impl Session {
         Ok(())
     }
 
-    /// Sets when a client that follows is asked to go on elsewhere.
+    /// Sets when the client is asked to reconnect, if its hello said that it follows such a
+    /// request.
     fn set_stay(&self, connection: &mut Connection) {
         let stay = self.terms.follows.and_then(|_| connection.app.moves.stay());
         connection.call_after(stay);
     }
 
-    /// Sends what the session remembers; every accepted frame is answered.
+    /// Sends the sealed state of the session. Called only when every accepted frame is answered.
     async fn seal(&self, reply: Arc<Reply>, app: Arc<App>) {
         let Some(shape) = self.terms.follows else { return };
         let terms = self.terms.sealed_for(&app, &shape);
         let (memory, wait_max) = (self.terms.memory(), app.timeouts.io);
-        // Copying and sealing up to a MiB is not for a thread that moves bytes.
+        // Copying and encrypting up to a MiB takes too long for a worker thread of tokio.
         let sealing = spawn_blocking(move || memory.seal(&app, &terms));
         let failed = |error: &dyn Display| {
             reply.send_error(problem::internal("the state cannot be sealed", error), None);
@@ -181,7 +184,7 @@ impl Session {
         }
     }
 
-    /// Takes one frame: into the slot, or back with an error.
+    /// Puts one frame into its slot, or answers it at once if it is invalid, stale or late.
     fn take(&mut self, connection: &Connection, frame: &Bytes, received: Instant, draining: bool) {
         self.keep_budget(connection, received);
         let (reply, metrics) = (&connection.reply, &connection.app.metrics);
@@ -217,7 +220,7 @@ impl Session {
         }
     }
 
-    /// Goes on with another tier where the budget calls for one.
+    /// Changes the tier of each finger whose budget calls for another one.
     fn keep_budget(&mut self, connection: &Connection, now: Instant) {
         let counts = &connection.reply.counts;
         for (part, counts) in self.terms.parts_mut().iter_mut().zip(counts) {
@@ -247,7 +250,7 @@ impl Session {
             return Err(Problem::new(ErrorCode::WrongLength, message).at("payload"));
         }
         let scale = match self.terms.pressure_scale_pa {
-            // All bits zero, or minus zero: left to the hello.
+            // A scale of 0 or -0 in the header means the scale of the hello.
             Some(scale) if header.scale.abs() <= 0.0 => scale,
             _ => header.scale,
         };

@@ -4,25 +4,28 @@ use std::time::{Duration, Instant};
 
 use papilla_session_state::Clock;
 
-/// How fast the best delay seen so far is forgotten: clocks drift by some 50 ppm at most.
+/// How fast the shortest delay seen so far is forgotten, s/s. Clocks drift by some 50e-6 at most.
 const DRIFT: f64 = 200e-6;
 
-/// Stale frames in a row after which the client's clock is taken to have been set.
+/// After this many stale frames in a row it is assumed that the client's clock was set, and the
+/// comparison begins anew.
 const IN_A_ROW_MAX: u32 = 64;
 
-/// What a session remembers to tell stale frames.
+/// What is remembered to tell the stale frames of a finger.
 ///
-/// The two clocks have nothing in common, so delays are counted against the fastest frame so far.
+/// The clocks of client and server have unrelated zeros, so the delay of a frame is measured
+/// against the fastest frame so far.
 #[derive(Debug)]
 pub(super) struct Freshness {
     begun: Instant,
-    /// Longest delay that is not stale, us; none: any.
+    /// Longest delay of a frame that is not stale, us; None: no delay makes a frame stale.
     stale_after_us: Option<u32>,
-    /// The newest sequence taken so far.
+    /// The newest sequence number accepted so far; None before the first.
     newest: Option<u32>,
     fastest: Option<Fastest>,
     in_a_row: u32,
-    /// Of a clock that ticks coarsely, the end of a tick is not held up.
+    /// Interpolates the times of a client's clock that ticks coarsely, so that a frame at the end
+    /// of a tick does not count as delayed.
     clock: Clock,
 }
 
@@ -40,9 +43,10 @@ impl Freshness {
         Self { begun, stale_after_us, newest: None, fastest: None, in_a_row: 0, clock }
     }
 
-    /// Whether a frame is stale; if it is not, it is the newest from now on.
+    /// Whether a frame is stale: delayed too long, or older than one accepted before. If it is not
+    /// stale, it becomes the newest.
     ///
-    /// Sequences may wrap: one is newer if it lies less than half of all numbers ahead.
+    /// Sequence numbers wrap around: one is newer if it lies less than half of all numbers ahead.
     pub(super) fn is_stale(
         &mut self,
         sequence: u32,
@@ -63,7 +67,7 @@ impl Freshness {
         let Some(stale_after_us) = self.stale_after_us else { return false };
         let client_time_us = self.clock.time_us(client_time_us);
         let since_begun = received.saturating_duration_since(self.begun);
-        // Any clock will do, so the difference may wrap.
+        // A client's clock may begin anywhere, so the difference may wrap around.
         let lag_us = (since_begun.as_micros() as i64).wrapping_sub(client_time_us as i64);
         let best_us = self.fastest.map_or(lag_us, |Fastest { lag_us, at }| {
             let passed = received.saturating_duration_since(at);

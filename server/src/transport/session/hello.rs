@@ -30,10 +30,10 @@ use crate::{
 /// Refused hellos after which the session ends.
 const ATTEMPTS: usize = 8;
 
-/// What a text message says, if it can be understood.
+/// A text message, or why it cannot be understood.
 pub(super) type Said = Result<ClientMessage, MessageError>;
 
-/// Waits for a hello that can be met, and answers ready.
+/// Waits for a hello that can be met, and answers it with `ready`.
 pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Terms, End> {
     let wait_max = connection.app.timeouts.io;
     let result = timeout(wait_max, async {
@@ -59,7 +59,7 @@ pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Te
     Ok(terms)
 }
 
-/// One message; a problem is one the session survives.
+/// Handles one message. After a [`Problem`] the session goes on; an [`End`] ends it.
 async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), Problem>, End> {
     let text = match connection.next(Wait::FOR_DRAIN).await? {
         Event::Draining => return Err(drained()),
@@ -91,7 +91,7 @@ async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), P
     }
 }
 
-/// The sealed state that a hello has announced.
+/// Waits for the sealed state that a hello with `resume` has announced.
 async fn state(connection: &mut Connection) -> Result<Result<Bytes, Problem>, End> {
     match connection.next(Wait::FOR_DRAIN).await? {
         Event::Draining => Err(drained()),
@@ -103,10 +103,10 @@ async fn state(connection: &mut Connection) -> Result<Result<Bytes, Problem>, En
     }
 }
 
-/// Longest text parsed by a thread that moves bytes, bytes: some 50 us of work.
+/// Longest text that is parsed on a worker thread of tokio, bytes: some 50 us of work.
 const PARSED_INLINE_MAX: usize = 16 * 1024;
 
-/// What a text says; a problem if too much waits to be read.
+/// Parses a text, a long one at the desk. A problem: the desk could not do it in time.
 pub(super) async fn parse(
     connection: &mut Connection,
     text: &Bytes,
@@ -118,8 +118,8 @@ pub(super) async fn parse(
     at_desk(connection, move |_| ClientMessage::from_json(&text)).await
 }
 
-/// New terms for an open session; frames that the server has accepted keep the old ones. A problem
-/// if the text is no hello, a misspelt one, or one that cannot be met; the old terms stand.
+/// Agrees on new terms for an open session. Frames that were accepted before keep the old terms. On
+/// a problem the old terms stand: the text is no hello, is misspelt, or cannot be met.
 pub(super) async fn renew(
     connection: &mut Connection,
     said: Said,
@@ -136,7 +136,7 @@ pub(super) async fn renew(
     }))
 }
 
-/// The hello for new terms in what a client says.
+/// The hello in a message of an open session.
 fn hello_of(said: Said) -> Result<Hello, Problem> {
     const DUE: &str = "binary frames are due once the session is ready, or a hello for new terms";
     match said {
@@ -154,8 +154,8 @@ fn hello_of(said: Said) -> Result<Hello, Problem> {
     }
 }
 
-/// Whether and how the hello can be met. Effects may have to place points, shapes to be checked:
-/// that is not for a thread that moves bytes.
+/// Agrees on the terms that a hello asks for, or says why not. This runs at the desk, since placing
+/// points and checking shapes may take too long for a worker thread of tokio.
 async fn meet(
     connection: &mut Connection,
     hello: Hello,
@@ -171,10 +171,10 @@ async fn meet(
     Ok(at_desk(connection, work).await?.and_then(|met| met))
 }
 
-/// Waits until what a hello needs is loaded, as long as its client is there: the fingers that it names,
-/// of each the tier that it names, or those that its budget may choose from, and the contact model if
-/// it may ask for that. A problem if that fails or takes too long. Whether there is such a tier is
-/// found later.
+/// Waits until what a hello needs is loaded, as long as its client is there: the fingers that it
+/// names, of each finger the tier that it names or the tiers that its budget may choose from, and
+/// the contact model if it may need that. A problem: loading failed or took too long. A tier that
+/// does not exist is not noticed here but when terms are agreed on.
 async fn first_use(connection: &mut Connection, hello: &Hello) -> Result<Result<(), Problem>, End> {
     let (app, client) = (Arc::clone(&connection.app), connection.client.clone());
     let names = names(hello);
@@ -213,7 +213,7 @@ async fn first_use(connection: &mut Connection, hello: &Hello) -> Result<Result<
     connection.while_there(loading).await
 }
 
-/// What is wrong with the name of a finger, as a hello is told.
+/// Turns a problem with a finger's name into one that names the member of the hello.
 fn of_hello(mut problem: Problem, number: usize) -> Problem {
     if problem.code == ErrorCode::NotFound {
         problem.code = ErrorCode::BadContact;
@@ -221,7 +221,8 @@ fn of_hello(mut problem: Problem, number: usize) -> Problem {
     problem.at(format!("fingers[{number}].name"))
 }
 
-/// The fingers of a hello, each once, with the number of the first that is so called.
+/// The names of the fingers in a hello, each once, with the number of the first finger of that
+/// name.
 fn names(hello: &Hello) -> Vec<(usize, &str)> {
     let mut names: Vec<(usize, &str)> = Vec::new();
     for (number, finger) in hello.fingers.iter().flatten().take(FINGERS_MAX).enumerate() {
@@ -235,7 +236,7 @@ fn names(hello: &Hello) -> Vec<(usize, &str)> {
     names
 }
 
-/// Numbers of the tiers of a finger that a hello needs, or may need, and that are not loaded.
+/// Numbers of the tiers of a finger that a hello needs or may need, and that are not loaded.
 fn to_load(catalogue: &Catalogue, hello: &Hello) -> Vec<usize> {
     let places: Vec<usize> = match (&hello.tier, hello.budget_us) {
         (Some(name), _) => catalogue.find(name).into_iter().collect(),
@@ -246,13 +247,14 @@ fn to_load(catalogue: &Catalogue, hello: &Hello) -> Vec<usize> {
     places.into_iter().filter(is_missing).map(|place| catalogue.tier_number(place)).collect()
 }
 
-/// Does work for a hello at the desk, as long as its client is there; a problem if it is too much.
+/// Does work for a hello at the desk, as long as its client is there. A problem: the desk is too
+/// busy, the work took too long, or it panicked.
 async fn at_desk<T: Send + 'static>(
     connection: &mut Connection,
     work: impl FnOnce(&Cancel) -> T + Send + 'static,
 ) -> Result<Result<T, Problem>, End> {
     let (app, client) = (Arc::clone(&connection.app), connection.client.clone());
-    // Before the time for a hello ends: it has come, and the client is told why it has to wait.
+    // Shorter than the time limit for a hello, so that the client is told why it has to wait.
     let wait_max = app.timeouts.io * 4 / 5;
     let working = timeout(wait_max, app.desk.work(client, work));
     let busy = |message: String| {

@@ -13,26 +13,27 @@ use governor::{
 };
 use papilla_proto::{ErrorCode, Problem};
 
-/// Length of a turn. What a session may do in it takes a fraction of it, and a client that sends
-/// without a pause waits for the next one with its bytes in its own buffers.
+/// Length of a turn. What a session may do in a turn takes a fraction of it. If a client sends
+/// more, its bytes wait in the system's buffers until the next turn.
 const TURN: Duration = Duration::from_millis(2);
 
-/// Frames of the WebSocket worked off in a turn: 4000 a second, four times a force loop's. Beyond
-/// that nearly all are superseded, and over TLS four such clients took both threads.
+/// WebSocket frames handled in a turn: 4000 a second, four times what a force loop sends. Beyond
+/// that nearly all are superseded anyway. Without this limit four such clients over TLS kept two
+/// threads busy.
 const FRAMES_MAX: u32 = 8;
 
-/// Bytes read in a turn: 262 MB/s, a third more than 1000 float32 maps a second.
+/// Bytes read in a turn: 262 MB/s, which is a third more than 1000 float32 maps a second.
 const BYTES_MAX: usize = 512 << 10;
 
-/// Reads of the connection in a turn, whatever they bring.
+/// Reads of the socket in a turn, however few bytes each brings.
 const READS_MAX: u32 = 128;
 
-/// Pings, pongs and closes a second that a session may send, and how many at once.
+/// Pings and pongs that a session may send: how many a second, and how many at once.
 const CONTROL_PER_S: NonZeroU32 = NonZeroU32::new(200).unwrap();
 const CONTROL_BURST: NonZeroU32 = NonZeroU32::new(400).unwrap();
 
-/// Text messages a second that a session may send (hellos: each may place points and take memory),
-/// and how many at once.
+/// Text messages that a session may send: how many a second, and how many at once. A text may be a
+/// hello, which places points and takes memory.
 const TEXT_PER_S: NonZeroU32 = NonZeroU32::new(4).unwrap();
 const TEXT_BURST: NonZeroU32 = NonZeroU32::new(8).unwrap();
 
@@ -48,7 +49,7 @@ pub(super) struct Limits<C: Clock = MonotonicClock> {
     control: Bucket<C>,
     text: Bucket<C>,
     clock: C,
-    /// Nothing is read before.
+    /// Nothing is read before this time. None: there is no such pause.
     paused_until: Option<Instant>,
 }
 
@@ -71,7 +72,7 @@ impl<C: Clock + Clone> Limits<C> {
         Self { begun: now, frames: 0, reads: 0, bytes: 0, control, text, clock, paused_until: None }
     }
 
-    /// When the session may go on; none: at once.
+    /// When the session may go on. None: at once.
     pub(super) fn resume_at(&mut self, now: Instant) -> Option<Instant> {
         if let Some(until) = self.paused_until.filter(|until| *until > now) {
             return Some(until);
@@ -79,8 +80,9 @@ impl<C: Clock + Clone> Limits<C> {
         self.paused_until = None;
         let end = self.begun + TURN;
         if now >= end {
-            // The timer wakes up to a turn late. A turn that counted from there would be half as
-            // long again, and a session that once fell behind would never catch up.
+            // The timer may fire up to a turn late. If the next turn were counted from then, it
+            // would be half as long again, and a session that once fell behind would never catch
+            // up.
             let begun = if now < end + TURN { end } else { now };
             (self.begun, self.frames, self.reads, self.bytes) = (begun, 0, 0, 0);
             return None;
@@ -99,10 +101,10 @@ impl<C: Clock + Clone> Limits<C> {
         self.frames += 1;
     }
 
-    /// A ping or a pong.
+    /// Counts a ping or a pong.
     ///
     /// # Errors
-    /// More than a session may send.
+    /// The session has sent more than it may.
     pub(super) fn on_control(&self) -> Result<(), Problem> {
         self.control.check().map_err(|_| {
             let message = format!("more than {CONTROL_PER_S} control frames a second");
@@ -110,7 +112,7 @@ impl<C: Clock + Clone> Limits<C> {
         })
     }
 
-    /// A text message; beyond the rate, the session pauses after it.
+    /// Counts a text message. If there were too many, the session pauses after this one.
     pub(super) fn on_text(&mut self, now: Instant) {
         if let Err(refused) = self.text.check() {
             self.paused_until = Some(now + refused.wait_time_from(self.clock.now()));

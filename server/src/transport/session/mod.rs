@@ -46,7 +46,7 @@ mod close {
     pub(super) const TOO_BIG: u16 = 1009;
 }
 
-/// Takes the upgrade, or says why not.
+/// Accepts the upgrade to a WebSocket, or answers why not.
 pub(crate) async fn open(
     State(app): State<Arc<App>>,
     Extension(principal): Extension<Principal>,
@@ -70,7 +70,7 @@ pub(crate) async fn open(
     };
     let place = app.admit_session(&principal).map_err(refuse)?;
     let client = principal.client;
-    // Taken before the upgrade: from here on the drain waits for this session.
+    // Subscribed before the upgrade, so that the drain waits for this session from here on.
     let drain = app.drain.subscribe();
     let accept = derive_accept_key(key.as_bytes());
     tokio::spawn(async move {
@@ -122,13 +122,14 @@ async fn converse(connection: &mut Connection, number: u64) -> End {
 /// Why a session ends.
 #[derive(Debug)]
 enum End {
-    /// The client closed, with this code.
+    /// The client closed the session, with this code if it gave one.
     Client(Option<u16>),
-    /// The client does not take what it is sent, or the connection broke.
+    /// The client does not read, or the connection broke while the server wrote.
     Broken(String),
-    /// What came is not WebSocket, or the connection broke in the middle of it.
+    /// The bytes received are not WebSocket, or the connection broke or ended without a close while
+    /// the server read.
     Garbled(String),
-    /// The server says so, with this error and this close code.
+    /// The server ends it, with this error and this close code.
     Refused(Problem, u16),
 }
 

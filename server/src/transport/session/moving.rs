@@ -14,17 +14,19 @@ use sha2::{Digest, Sha256};
 
 use crate::transport::app::App;
 
-/// The first byte of what is sealed.
+/// The first byte of sealed data, which says whether there is no state to restore, a state behind
+/// it, or none because it was too large.
 const NOTHING: u8 = 0;
 const STATE: u8 = 1;
 const TOO_LARGE: u8 = 2;
 
-/// What shapes the state of a session, but for its tier.
+/// Hash of those members of a hello on which the form of the session's state depends.
 #[derive(Clone, Copy)]
 pub(super) struct Shape([u8; 32]);
 
 impl Shape {
-    /// Members that choose, bound or show, but leave the state as it is, do not count.
+    /// The shape for a hello. Members that do not change the state's form are left out: those that
+    /// choose a tier, set bounds, or select what is shown.
     pub(super) fn of(hello: &Hello) -> Self {
         let plain = Hello::default();
         let shape = Hello {
@@ -49,12 +51,13 @@ impl Shape {
             error_estimate: None,
             ..hello.clone()
         };
-        // A hello that came as JSON goes as JSON.
+        // Never fails, since the hello was read from JSON.
         let text = serde_json::to_vec(&shape).unwrap_or_default();
         Self(Sha256::digest(text).into())
     }
 
-    /// For a session whose first finger has this tier; and the atlases of all fingers it has.
+    /// What a state is bound to: this shape, the tier of the first finger, and the atlases of all
+    /// fingers.
     pub(super) fn on<'a>(
         &'a self,
         tier: &str,
@@ -65,7 +68,7 @@ impl Shape {
     }
 }
 
-/// Whatever of a session answers depend on.
+/// The parts of a session that answers depend on.
 #[derive(Clone)]
 pub(super) struct Memory {
     pub(super) effects: Vec<Arc<Mutex<Effects>>>,
@@ -98,7 +101,7 @@ impl Memory {
         state.end()
     }
 
-    /// The state, sealed; in its place a word on why there is none.
+    /// The sealed state. If it is too large, a sealed note that says so.
     ///
     /// # Errors
     /// The system gives no random numbers.
@@ -110,8 +113,8 @@ impl Memory {
         }
     }
 
-    /// Goes on from a sealed state, and says what came of it. Unless it was resumed or there was
-    /// nothing, this memory may be half of one and half of the other.
+    /// Restores a sealed state, and returns what came of it. Unless that is `Resumed` or `Nothing`,
+    /// this memory may be restored in part and must not be used.
     pub(super) fn resume(&self, app: &App, terms: &SealedFor, sealed: &[u8]) -> Resumption {
         let opened = match app.moves.keys.open(terms, sealed, SystemTime::now()) {
             Ok(opened) => opened,

@@ -12,29 +12,29 @@ use tokio::{net::TcpStream, sync::Notify};
 
 use crate::transport::room;
 
-/// Room for messages that the system has no room for. The task reads nothing while one is left, so
-/// there are never more than the task's own last words and two answers of threads.
+/// Capacity for messages that the system's buffer has no room for. While one is left the task reads
+/// nothing, so only its own last messages and answers to accepted frames can follow.
 const LEFT: usize = 8;
 
-/// The way out of a session. Whole messages go in; they leave in that order.
+/// What a session sends through. Whole messages go in, and they leave in that order.
 ///
-/// Whoever sends writes at once what the system takes, without waiting: an answer then costs no
-/// wake-up of the task. What is left is the task's to write.
+/// A sender writes at once as much as the system's buffer takes, without waiting, so that an answer
+/// does not have to wake the task. The task writes what is left.
 #[derive(Debug)]
 pub(super) struct Outbox {
-    /// None: only the task can write (TLS).
+    /// None: the connection uses TLS, and only the task can write.
     stream: Option<Arc<TcpStream>>,
     state: Mutex<State>,
-    /// Told when the task has something to do.
+    /// Notified when the task has something to do.
     pub(super) call: Notify,
 }
 
-/// How far the writing of what was left has come.
+/// The progress of writing messages that were left.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Written {
     /// Whether nothing is left.
     pub(super) is_all: bool,
-    /// Bytes that the system has taken just now: as many as the client has read, or more.
+    /// Bytes that the system took in this call.
     pub(super) bytes: usize,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Written {
 struct State {
     left: VecDeque<Bytes>,
     broken: Option<String>,
-    /// The last message is in: nothing may follow it.
+    /// The closing message was put in, and nothing may follow it.
     is_closed: bool,
 }
 
@@ -58,18 +58,18 @@ impl Outbox {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sends a message, now or as soon as there is room.
+    /// Sends a message, at once or as soon as there is room.
     pub(super) fn send(&self, message: &Bytes) {
         self.put(message, false, |from| message.slice(from..));
     }
 
-    /// Sends the message that closes the session. An answer that a thread has ready later is
-    /// dropped: a client must hear nothing after the close (RFC 6455, section 5.5.1).
+    /// Sends the message that closes the session. Answers that become ready later are dropped,
+    /// since nothing may follow a close frame (RFC 6455, section 5.5.1).
     pub(super) fn send_last(&self, message: &Bytes) {
         self.put(message, true, |from| message.slice(from..));
     }
 
-    /// Sends a message that is copied only if there is no room for it.
+    /// Sends a message. It is copied only if the system's buffer has no room for it.
     pub(super) fn send_copy(&self, message: &[u8]) {
         self.put(message, false, |from| Bytes::copy_from_slice(&message[from..]));
     }
@@ -97,11 +97,11 @@ impl Outbox {
         }
     }
 
-    /// Writes what is left as far as there is room. To `insist` asks the system itself whether there
-    /// is any ([`room::send`]).
+    /// Writes as much of what is left as there is room for. With `insist` it offers bytes even if
+    /// the socket is not reported writable ([`room::send`]).
     ///
     /// # Errors
-    /// The connection is broken, in words.
+    /// The connection is broken; the text says why.
     pub(super) fn go_on(&self, insist: bool) -> Result<Written, String> {
         let mut state = self.state();
         if let Some(error) = &state.broken {
@@ -126,7 +126,7 @@ impl Outbox {
         Ok(Written { is_all: true, bytes })
     }
 
-    /// The next message that is left, for a task that writes by itself.
+    /// Takes the next message that is left, for a task that writes by itself (TLS).
     pub(super) fn take(&self) -> Option<Bytes> {
         self.state().left.pop_front()
     }

@@ -34,13 +34,14 @@ use crate::{
 /// What a session sends: answers, messages and errors, in the order in which they are ready.
 pub(super) struct Reply {
     pub(super) out: Outbox,
-    /// Frames accepted and not yet answered: none, one with a thread, one in the slot.
+    /// Number of frames that were accepted and are not answered yet: of each finger at most one
+    /// with a thread and one in its slot.
     outstanding: AtomicUsize,
-    /// Whether the task waits for the last of them.
+    /// Whether the task waits until all of them are answered.
     is_awaited: AtomicBool,
     is_over: AtomicBool,
-    /// How the frames fare by their deadlines: of each finger that the session renders with other
-    /// networks.
+    /// Counts of late frames and of frames in time: one for each part of the session's terms, in
+    /// their order.
     pub(super) counts: [FrameCounts; FINGERS_MAX],
     app: Arc<App>,
 }
@@ -57,12 +58,12 @@ impl Reply {
         }
     }
 
-    /// A frame is accepted: called before a thread gets it.
+    /// Counts an accepted frame. Called before a thread can get it.
     pub(super) fn begin(&self) {
         self.outstanding.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// An accepted frame is answered.
+    /// Counts an accepted frame as answered.
     pub(super) fn finish(&self) {
         self.outstanding.fetch_sub(1, Ordering::SeqCst);
         if self.is_awaited.load(Ordering::SeqCst) {
@@ -70,13 +71,13 @@ impl Reply {
         }
     }
 
-    /// Whether every accepted frame is answered; if not, the task is called when it is.
+    /// Whether every accepted frame is answered. From then on the task is notified at each answer.
     pub(super) fn is_settled(&self) -> bool {
         self.is_awaited.store(true, Ordering::SeqCst);
         self.outstanding.load(Ordering::SeqCst) == 0
     }
 
-    /// The session is over: what is not rendered yet need not be.
+    /// Marks the session as over: frames that wait need not be rendered any more.
     pub(super) fn end(&self) {
         self.is_over.store(true, Ordering::Release);
     }
@@ -94,20 +95,20 @@ impl Reply {
         self.out.send(&wire::frame(opcode::BINARY, payload));
     }
 
-    /// Tells the client of an error the session survives.
+    /// Tells the client of an error after which the session goes on.
     pub(super) fn send_error(&self, problem: Problem, sequence: Option<u32>) {
         self.app.metrics.error(problem.code);
         let problem = problem::bounded(problem);
         self.send_message(&ServerMessage::Error(SessionError::new(problem, sequence, false)));
     }
 
-    /// Refuses a frame.
+    /// Answers a frame with an error.
     pub(super) fn refuse(&self, problem: Problem, sequence: Option<u32>) {
         self.app.metrics.of(Transport::Session).error.inc();
         self.send_error(problem, sequence);
     }
 
-    /// Answers with a header alone.
+    /// Answers a frame with a header and no payload.
     pub(super) fn send_status(
         &self,
         header: &FrameHeader,
@@ -128,7 +129,7 @@ impl Reply {
         self.out.send_copy(&message[..len + head.len()]);
     }
 
-    /// Sends what a thread made of a frame.
+    /// Sends the answer that a thread has made.
     fn answer(&self, done: Done) {
         let Some(mut header) = done.header else { return };
         header.queue_us = us(done.times.queue);
@@ -153,7 +154,7 @@ impl Reply {
         if let Output::Samples(sample_type) = done.output {
             head.sample_type = sample_type;
         }
-        // Counted before it is sent: whoever has the answer finds it in the metrics.
+        // Counted before it is sent, so that a client which has the answer finds it in the metrics.
         self.app.metrics.of(Transport::Session).ok.inc();
         self.counts.iter().for_each(|counts| counts.good(done.tier));
         let timers = self.app.metrics.tier(done.tier);
@@ -163,7 +164,7 @@ impl Reply {
         timers.total.observe(done.received.elapsed());
     }
 
-    /// Writes the heads into the room before the samples, and sends it all.
+    /// Writes both headers into the free bytes before the payload, and sends it all.
     fn send(&self, mut bytes: BytesMut, head: &FrameHeader) {
         let (frame, len) = wire::out_head(opcode::BINARY, bytes.len() - HEADROOM);
         bytes[HEADROOM - len..HEADROOM].copy_from_slice(&frame[OUT_HEAD_MAX - len..]);

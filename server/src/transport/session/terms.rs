@@ -34,72 +34,73 @@ use crate::{
     transport::app::App,
 };
 
-/// What hello and ready agreed on.
+/// What client and service agreed on by `hello` and `ready`.
 pub(super) struct Terms {
-    /// What fingers are rendered with: one for each name in the hello.
+    /// What the fingers are rendered with: one part for each name of a finger in the hello.
     parts: Vec<Part>,
-    /// The part of each finger, by its number.
+    /// Index into `parts` of each finger of the session.
     part_of: Vec<usize>,
-    /// Whether the hello names a finger.
+    /// Whether the hello gives a name to any finger.
     has_names: bool,
-    /// Deadline of frames that name none, us.
+    /// Budget of frames whose header gives none, us; None: such frames have no deadline.
     pub(super) budget_us: Option<u32>,
     /// Sample type of the client's frames.
     pub(super) sample_type: SampleType,
     /// Sample type of the answers.
     pub(super) answer_sample_type: SampleType,
-    /// Pa per unit of frames whose header says 0.
+    /// Pa per unit for frames whose header has the scale 0.
     pub(super) pressure_scale_pa: Option<f32>,
-    /// What becomes of pressure above what the tier was trained on.
+    /// What is done with pressure above that of the tier's training.
     pub(super) out_of_range: OutOfRange,
-    /// Longest delay on the way of a frame that is not stale, us.
+    /// Longest delay of a frame that is not stale, us; None: no delay makes a frame stale.
     pub(super) stale_after_us: Option<u32>,
-    /// What was asked for beside the bare map, of each finger; none of the bare map.
+    /// The effects of each finger; empty if only the bare map was asked for.
     pub(super) effects: Vec<Arc<Mutex<Effects>>>,
     pub(super) hand: Hand,
     _fingers: OwnedSemaphorePermit,
-    /// Of clients that follow a request to reconnect: what shapes their state.
+    /// What the form of the state depends on. None: the client does not follow a request to
+    /// reconnect.
     pub(super) follows: Option<Shape>,
-    /// What became of the state that the hello brought.
+    /// What became of the sealed state that came with the hello; None if there was none.
     pub(super) resumption: Option<Resumption>,
-    /// What the client is told of them.
+    /// What `ready` says of the effects.
     info: ReadyInfo,
-    /// Each finger as it was when this was agreed on, until the client is told: no session keeps
-    /// models that a reload replaces.
+    /// The fingers as they were when the terms were agreed on. `ready` takes them, so that a
+    /// session does not keep models alive that a reload replaces.
     agreed: Vec<Loaded>,
 }
 
-/// What the fingers of one name are rendered with.
+/// What all fingers of one name are rendered with.
 pub(super) struct Part {
     /// Place of the finger among those of the service.
     pub(super) finger: usize,
     /// Number of the tier.
     pub(super) tier: usize,
-    /// Who chooses the tier while the session lasts; none: it stays.
+    /// Changes the tier during the session to keep the budget. None: the tier stays.
     pub(super) budget: Option<Budget>,
-    /// Time that a frame's contact is expected to take, us; none if nothing is solved.
+    /// Expected time of a frame's contact, us; None if no contact is solved.
     pub(super) contact_us: Option<u64>,
     atlas_hash: String,
-    /// The first of the session's fingers that is of this part.
+    /// Number of the first finger of the session that has this part.
     first: usize,
     permit: Permit,
 }
 
 impl Part {
-    /// Goes on with another tier, by its place in the catalogue.
+    /// Changes to the tier at this place of the catalogue.
     pub(super) fn move_to(&mut self, catalogue: &Catalogue, place: usize) {
         self.tier = catalogue.tier_number(place);
         self.permit = Permit::take(&catalogue.tiers[place]);
     }
 
-    /// The tier, in the catalogue in which it was chosen.
+    /// The tier. `of` must hold the catalogue in which it was chosen.
     fn tier<'a>(&self, of: &'a Loaded) -> &'a Tier {
         &of.catalogue.tiers[places(self.tier).1]
     }
 }
 
 impl Terms {
-    /// What a finger of the session is rendered with, by its number.
+    /// The part of a finger of the session, by the finger's number.
     pub(super) fn part(&self, finger: usize) -> &Part {
         &self.parts[self.part_of.get(finger).copied().unwrap_or_default()]
     }
@@ -108,23 +109,23 @@ impl Terms {
         &mut self.parts
     }
 
-    /// What a state of this shape is sealed for.
+    /// What a state of this shape is bound to when it is sealed.
     pub(super) fn sealed_for<'a>(&'a self, app: &App, shape: &'a Shape) -> SealedFor {
         let atlases = self.parts.iter().map(|part| part.atlas_hash.as_str());
         shape.on(&app.tier_name(self.part(0).tier), atlases)
     }
 
-    /// Whether the network is asked.
+    /// Whether answers show SED, so that the network has to run.
     pub(super) fn shows_sed(&self) -> bool {
         self.info.shows_sed
     }
 
-    /// What answers depend on of the frames before.
+    /// The state that answers depend on, left by earlier frames.
     pub(super) fn memory(&self) -> Memory {
         Memory { effects: self.effects.clone(), fingers: self.hand.fingers().to_vec() }
     }
 
-    /// Most bytes of an answer, its heads included.
+    /// The most bytes of an answer, with its headers.
     pub(super) fn answer_len_max(&self) -> usize {
         let plain = HEADER_LEN + Output::Samples(self.answer_sample_type).size_hint();
         let effects = self.effects.first();
@@ -136,7 +137,7 @@ impl Terms {
     }
 }
 
-/// A place in the count of a tier's sessions; given back when it is dropped.
+/// Counts one session of a tier as long as it exists.
 struct Permit(Arc<AtomicUsize>);
 
 impl Permit {
@@ -158,7 +159,7 @@ struct ReadyInfo {
     /// Units of the effect `spikes`, of each finger.
     units: Vec<Option<Vec<PlacedUnit>>>,
     sections: Vec<Section>,
-    /// Whether the network is asked.
+    /// Whether answers show SED, so that the network has to run.
     shows_sed: bool,
 }
 
@@ -169,8 +170,8 @@ impl Default for ReadyInfo {
     }
 }
 
-/// Fingers of a hello that take a place: a session that sends maps of pressure has the memory of
-/// one by itself.
+/// Number of fingers of a hello that count against the limit for fingers. A session that sends
+/// pressure maps has one finger free, since each session has the memory of one in any case.
 fn places_of(hello: &Hello) -> usize {
     let fingers = hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX);
     let sends_maps = hello.input.unwrap_or_default() == Input::Pressure
@@ -178,7 +179,7 @@ fn places_of(hello: &Hello) -> usize {
     fingers.saturating_sub(usize::from(sends_maps))
 }
 
-/// The fingers of a hello on the skins of these, and their places.
+/// Makes the fingers of a hello on these skins, with the permit for the places that they take.
 fn hand(
     app: &App,
     loaded: &[Loaded],
@@ -204,8 +205,8 @@ fn skin(Loaded { catalogue, contact }: &Loaded) -> Skin<'_> {
     }
 }
 
-/// What each finger of a hello is, by its number; one at least. More than there may be are refused
-/// later.
+/// The finger of the service behind each finger of a hello, by its number; at least one. A hello
+/// with too many fingers is refused later.
 fn loaded(app: &App, hello: &Hello) -> Result<Vec<Loaded>, Problem> {
     let announced = hello.fingers.iter().flatten().take(FINGERS_MAX).enumerate();
     let named = announced.map(|(number, finger)| {
@@ -215,15 +216,15 @@ fn loaded(app: &App, hello: &Hello) -> Result<Vec<Loaded>, Problem> {
     if loaded.is_empty() { Ok(vec![app.finger(DEFAULT_FINGER)?]) } else { Ok(loaded) }
 }
 
-/// The effects of the session that a hello names; all others are the tier's.
+/// The session effect of this name. None: the name is that of an effect of the tier.
 fn runtime_effect(name: &str) -> Option<RuntimeEffect> {
     name.parse().ok()
 }
 
-/// The terms of a session that sends this hello, going on from a sealed state if there is one.
+/// Agrees on the terms for a hello, and restores a sealed state if it brought one.
 ///
 /// # Errors
-/// It cannot be met; the problem names the member.
+/// The hello cannot be met; the problem names the member.
 pub(super) fn meet(
     app: &App,
     hello: &Hello,
@@ -236,7 +237,7 @@ pub(super) fn meet(
     let for_terms = terms.sealed_for(app, &shape);
     let resumption = terms.memory().resume(app, &for_terms, sealed);
     if !matches!(resumption, Resumption::Resumed | Resumption::Nothing) {
-        // Nothing of it stays, not even the tier that it named.
+        // The state may be restored in part, and may have chosen the tier: agree again without it.
         drop(terms);
         terms = agree(app, hello, None, cancel)?;
     }
@@ -244,13 +245,14 @@ pub(super) fn meet(
     Ok(terms)
 }
 
-/// Nobody hears of it.
+/// Ends the work if the client has left; nobody receives this problem.
 fn still_asked(cancel: &Cancel) -> Result<(), Problem> {
     let gone = || Problem::new(ErrorCode::Overloaded, "the client has left");
     if cancel.is_set() { Err(gone()) } else { Ok(()) }
 }
 
-/// The same without a state, which may have named the tier it came from.
+/// Agrees on the terms for a hello. `before` is the tier that a sealed state names, if there is
+/// one.
 fn agree(
     app: &App,
     hello: &Hello,
@@ -271,7 +273,7 @@ fn agree(
             part_of.push(part);
             continue;
         }
-        // The state that is brought names the tier of the first finger.
+        // A sealed state names only the tier of the first finger.
         let before = before.filter(|_| number == 0);
         let place = choose(catalogue, hello, &wanted, before)
             .map_err(|problem| of_finger(hello, number, problem))?;
@@ -330,7 +332,8 @@ fn agree(
     })
 }
 
-/// The place of the tier that renders a finger.
+/// Chooses the tier of a finger: the one that the hello names, or else `before` if it still serves,
+/// or else the one that [`Catalogue::choose`] picks. Returns its place.
 fn choose(
     catalogue: &Catalogue,
     hello: &Hello,
@@ -352,7 +355,7 @@ fn choose(
     };
     let tier = &catalogue.tiers[place];
     if !tier.is_loaded() {
-        // Its first use came to nothing, or a reload came between.
+        // It could not be loaded, or a reload came in between.
         let message = format!("tier {} is not loaded; try again in a moment", tier.name);
         return Err(Problem::new(ErrorCode::Overloaded, message).at("tier"));
     }
@@ -369,7 +372,7 @@ fn choose(
     Ok(place)
 }
 
-/// Answers of one session are laid out alike.
+/// The problem of a finger whose answers would be laid out differently from those of the first.
 fn other_sections(number: usize) -> Problem {
     let message = "answers would be laid out otherwise than those of fingers[0], since its atlas has \
                    not as many vertices, or the effect 'spikes' not as many units: ask for the \
@@ -378,7 +381,7 @@ fn other_sections(number: usize) -> Problem {
     Problem::new(ErrorCode::BadContact, message).at(format!("fingers[{number}].name"))
 }
 
-/// What the client is told of its terms, once.
+/// Makes the `ready` message. Called once for these terms, since it takes `agreed`.
 pub(super) fn ready(app: &App, number: u64, terms: &mut Terms) -> Ready {
     let agreed = std::mem::take(&mut terms.agreed);
     let terms = &*terms;
@@ -435,7 +438,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &mut Terms) -> Ready {
     }
 }
 
-/// Time from receipt to answer that is expected of a finger, us.
+/// Expected time of a finger's frame from receipt to answer, us.
 fn predicted_us(terms: &Terms, finger: usize, Loaded { catalogue, contact }: &Loaded) -> u64 {
     let part = terms.part(finger);
     let of_tier = if terms.info.shows_sed {
@@ -451,19 +454,19 @@ fn predicted_us(terms: &Terms, finger: usize, Loaded { catalogue, contact }: &Lo
         .saturating_add(catalogue.runtime.cost_us(&terms.info.names))
 }
 
-/// J/m3 per unit of scaled answers.
+/// J/m3 of one unit of an answer's samples.
 fn sed_scale(terms: &Terms, tier: &Tier) -> f32 {
     scale_of(Output::Samples(terms.answer_sample_type), tier.sed_max_j_per_m3)
 }
 
-/// What the method of a finger errs with it.
+/// The expected errors of the contact method of a finger, if its contact model knows them.
 fn expected_error(terms: &Terms, finger: usize, of: &Loaded) -> Option<MethodError> {
     let errors = of.contact.as_ref().and_then(|contact| contact.errors.as_ref());
     errors.zip(terms.hand.method_of(finger)).and_then(|(errors, of)| errors.of(of)).cloned()
 }
 
-/// The names of tiers by the numbers that answers give, where there are several; numbers that stand
-/// for none have no name.
+/// The names of tiers, indexed by the number that answers give; a number that stands for no tier
+/// has an empty name. None: only one tier can answer.
 fn tier_names(app: &App, terms: &Terms) -> Option<Vec<String>> {
     let has_budget = terms.parts.iter().any(|part| part.budget.is_some());
     if !has_budget && terms.parts.len() == 1 {
@@ -471,7 +474,7 @@ fn tier_names(app: &App, terms: &Terms) -> Option<Vec<String>> {
     }
     let mut names = Vec::new();
     for part in &terms.parts {
-        // As it is now: a tier that has come meanwhile may be taken.
+        // The present catalogue is used, since a tier that was added meanwhile may be chosen.
         let Some(catalogue) = app.reloader.catalogue_at(part.finger) else { continue };
         for (place, tier) in catalogue.tiers.iter().enumerate() {
             let number = catalogue.tier_number(place);
@@ -501,7 +504,7 @@ fn finger_terms(terms: &Terms, finger: usize, of: &Loaded) -> FingerTerms {
     }
 }
 
-/// What the client is asked about a finger whose network another finger trained.
+/// The warning about a finger whose network was trained on another finger.
 fn borrowed(terms: &Terms, finger: usize, of: &Loaded) -> Option<Warning> {
     let part = terms.part(finger);
     let lender = part.tier(of).trained_on.as_ref().filter(|_| part.first == finger)?;

@@ -7,28 +7,28 @@ use std::{
 
 use crate::core::catalogue::Catalogue;
 
-/// Late frames after which a session goes down; two more may be on their way.
+/// Late frames after which a session changes to a faster tier. Two more may be on their way then.
 const LATE_MOST: u32 = 8;
-/// Frames in time, one after another, after which earlier late ones are forgotten.
+/// Consecutive frames in time after which earlier late frames are forgotten.
 const GOOD_LEAST: u32 = 32;
 /// Time between two changes before a more accurate tier is tried. It doubles each time the tier
 /// that was tried cannot keep the budget, so that a session does not swing.
 const TRY_AFTER: Duration = Duration::from_secs(2);
 const TRY_AFTER_MOST: Duration = Duration::from_secs(64);
-/// Share of the budget that a more accurate tier may be expected to take.
+/// Greatest share of the budget that a more accurate tier may be expected to take to be tried.
 const SHARE_TO_CLIMB: f64 = 0.8;
 
-/// How the frames of a session fare: counted where answers are sent.
+/// Counts of late frames and of frames in time. They are updated where answers are sent.
 #[derive(Debug, Default)]
 pub(super) struct FrameCounts {
-    /// Number of the tier that the counts are of: answers of the one before do not count.
+    /// Number of the tier that the counts are for. Answers of an earlier tier are not counted.
     tier: AtomicUsize,
     late: AtomicU32,
     good: AtomicU32,
 }
 
 impl FrameCounts {
-    /// A frame of this tier was late.
+    /// Counts a late frame of this tier.
     pub(super) fn late(&self, tier: usize) {
         if tier == self.tier.load(Ordering::Relaxed) {
             self.late.fetch_add(1, Ordering::Relaxed);
@@ -36,7 +36,7 @@ impl FrameCounts {
         }
     }
 
-    /// A frame of this tier was in time.
+    /// Counts a frame of this tier that was in time.
     pub(super) fn good(&self, tier: usize) {
         if tier == self.tier.load(Ordering::Relaxed)
             && self.good.fetch_add(1, Ordering::Relaxed) >= GOOD_LEAST
@@ -69,7 +69,8 @@ impl Budget {
         Self { budget_us, effects, changed: None, try_after: TRY_AFTER, has_climbed: false }
     }
 
-    /// The place of the tier for the next frame, where it is another than `tier`. Allocates nothing.
+    /// The place of the tier to change to for the next frame; None: stay with `tier`. Allocates
+    /// nothing.
     pub(super) fn next(
         &mut self,
         catalogue: &Catalogue,
@@ -97,7 +98,7 @@ impl Budget {
         let climbs = error_of(catalogue, next) < error_of(catalogue, tier);
         self.try_after = match (self.has_climbed, climbs) {
             (true, false) => (2 * self.try_after).min(TRY_AFTER_MOST),
-            // What was tried before has held.
+            // The tier that was tried before has kept the budget.
             (true, true) => TRY_AFTER,
             (false, _) => self.try_after,
         };
@@ -106,15 +107,16 @@ impl Budget {
         Some(next)
     }
 
-    /// Of the faster tiers the most accurate that is expected to keep the budget, or else the
-    /// fastest.
+    /// Among the tiers that are faster than this one, the most accurate that is expected to keep
+    /// the budget, or else the fastest. None: no tier is faster.
     fn faster(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
         let time_us = catalogue.predicted_latency_us(tier);
         let is_faster = |place: usize| catalogue.predicted_latency_us(place) < time_us;
         catalogue.choose_among(self.budget_us, &self.effects, is_faster)
     }
 
-    /// The most accurate tier that may keep the budget, if that is more accurate than this one.
+    /// Among the tiers that are more accurate than this one and may keep the budget, the most
+    /// accurate.
     fn more_accurate(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
         let most_us = SHARE_TO_CLIMB * f64::from(self.budget_us);
         catalogue

@@ -14,18 +14,18 @@ use crate::core::buffers::{Frames, HEADROOM, Store};
 
 const _: () = assert!(HEAD_MAX <= HEADROOM && OUT_HEAD_MAX <= HEADROOM);
 
-/// Largest message read, bytes. Five times a frame, so that a frame that is too long is read,
-/// refused and survived; beyond this the connection is closed.
+/// Largest message that is read, bytes: five times a float32 map. Within this limit a frame that is
+/// too long is read and refused, and the session goes on; beyond it the connection is closed.
 pub(super) const MESSAGE_MAX: usize = 1 << 20;
 
 /// Longest payload of a control frame, bytes.
 const CONTROL_MAX: usize = 125;
 
-/// Room made at a time for a frame that the session has no room for, bytes: a length that is only
-/// announced costs no memory.
+/// By how much the buffer grows at a time, bytes, if a frame does not fit. It grows only as bytes
+/// arrive, so a length that is merely announced costs no memory.
 const STEP: usize = 64 * 1024;
 
-/// Most bytes of the head of a client's frame.
+/// The most bytes in the header of a client's frame.
 pub(super) const HEAD_MAX: usize = 14;
 
 /// Kinds of frames.
@@ -38,10 +38,10 @@ pub(super) mod opcode {
     pub(in crate::transport::session) const PONG: u8 = 10;
 }
 
-/// What a client says.
+/// A whole message of a client.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Message {
-    /// UTF-8 is not checked yet.
+    /// A text, which has not been checked to be UTF-8 yet.
     Text(Bytes),
     Binary(Bytes),
     Ping(Bytes),
@@ -50,28 +50,28 @@ pub(super) enum Message {
     Close(Option<u16>),
 }
 
-/// Why what a client sends cannot be understood any more.
+/// Why the bytes of a client cannot be understood. The connection has to be closed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// Not WebSocket.
+    /// They break the WebSocket protocol in this way.
     Protocol(&'static str),
     /// A message beyond [`MESSAGE_MAX`].
     TooLarge,
 }
 
-/// The head of a client's frame.
+/// The header of a client's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Head {
     is_last: bool,
     opcode: u8,
     mask: [u8; 4],
-    /// Bytes of the head itself.
+    /// Length of the header itself, bytes.
     len: usize,
     payload_len: usize,
 }
 
 impl Head {
-    /// None: more bytes are needed.
+    /// Reads a header. None: more bytes are needed.
     fn parse(bytes: &[u8]) -> Result<Option<Self>, Fault> {
         let &[first, second, ref rest @ ..] = bytes else { return Ok(None) };
         let (is_last, opcode, short) =
@@ -107,38 +107,38 @@ impl Head {
     }
 }
 
-/// What a whole frame of the client's has brought.
+/// What a complete frame of a client is.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Received {
     Message(Message),
-    /// A piece of a message that goes on.
+    /// A fragment of a message that is not complete yet.
     Piece,
 }
 
-/// What has come and is not yet a message.
+/// The bytes that have come and are not a message yet.
 #[derive(Debug, Default)]
 pub(super) struct Inbound {
     spare: Frames,
-    /// Room that a frame of this session needs, bytes.
+    /// Size of this session's largest frame, bytes.
     room: usize,
     buffer: BytesMut,
-    /// Bytes at the front of the buffer that are dealt with.
+    /// Number of bytes at the front of the buffer that are dealt with.
     taken: usize,
-    /// The head of the frame that is on its way, and how much of its payload is unmasked.
+    /// The header of the frame that is on its way, and how many bytes of its payload are unmasked.
     head: Option<Head>,
     unmasked: usize,
-    /// The pieces of a message so far, and its kind.
+    /// The fragments of a message so far, and its opcode.
     pieces: BytesMut,
     in_pieces: Option<u8>,
 }
 
 impl Inbound {
-    /// Begins with bytes that somebody else has read.
+    /// Begins with bytes that the HTTP server has read already.
     pub(super) fn new(read: &[u8]) -> Self {
         Self { buffer: BytesMut::from(read), ..Self::default() }
     }
 
-    /// Takes memory for frames of so many bytes, once for the whole session.
+    /// Takes memory for frames of `frame_len` bytes, once for the whole session.
     pub(super) fn expect(&mut self, frame_len: usize, store: &Store) {
         self.room = HEAD_MAX + frame_len;
         self.spare = store.frames(self.room);
@@ -146,20 +146,20 @@ impl Inbound {
         self.renew(&read[self.taken..]);
     }
 
-    /// Goes on in a buffer that nobody holds, with `read` at its start.
+    /// Changes to a free buffer that begins with `read`.
     fn renew(&mut self, read: &[u8]) {
         self.buffer = self.spare.lend(self.room.max(read.len()));
         self.buffer.extend_from_slice(read);
         self.taken = 0;
     }
 
-    /// Gives its memory back.
+    /// Gives the buffers back to the store.
     pub(super) fn end(&mut self, store: &Store) {
         self.buffer = BytesMut::new();
         store.keep_frames(&mut self.spare);
     }
 
-    /// Where to read to; there is always room.
+    /// The buffer to read into. There is always room in it.
     pub(super) fn room(&mut self) -> &mut BytesMut {
         if self.taken == self.buffer.len() {
             self.buffer.clear();
@@ -167,7 +167,7 @@ impl Inbound {
         }
         if self.buffer.capacity() == self.buffer.len() {
             if self.taken > 0 {
-                // Less than a frame, once for a whole buffer of them.
+                // What is moved is less than a frame, and it happens once for each full buffer.
                 self.buffer.copy_within(self.taken.., 0);
                 self.buffer.truncate(self.buffer.len() - self.taken);
                 self.taken = 0;
@@ -178,13 +178,13 @@ impl Inbound {
         &mut self.buffer
     }
 
-    /// Whether a message has begun and not ended.
+    /// Whether a message has begun that is not complete.
     pub(super) fn is_amid(&self) -> bool {
         self.taken < self.buffer.len() || self.in_pieces.is_some()
     }
 
-    /// What the next frame brings, if all of it has come. It takes time for that frame alone,
-    /// however many lie behind it.
+    /// The next frame; None: not all of it has come. The time that it takes depends on that frame
+    /// alone, however many lie behind it.
     pub(super) fn next(&mut self) -> Result<Option<Received>, Fault> {
         let head = match self.head {
             Some(head) => head,
@@ -207,7 +207,7 @@ impl Inbound {
         Ok(Some(message.map_or(Received::Piece, Received::Message)))
     }
 
-    /// Whether a frame may come now.
+    /// Checks that a frame with this header may come now.
     fn check(&self, head: Head) -> Result<Head, Fault> {
         match (head.opcode, self.in_pieces) {
             (opcode::CONTINUATION, None) => Err(Fault::Protocol("a continuation of nothing")),
@@ -221,7 +221,7 @@ impl Inbound {
         }
     }
 
-    /// Takes a frame that has all come; none: a piece of a message.
+    /// Handles a complete frame. None: it is a fragment of a message.
     fn complete(&mut self, head: Head, payload: Range<usize>) -> Result<Option<Message>, Fault> {
         if head.is_last && matches!(head.opcode, opcode::TEXT | opcode::BINARY) {
             return Ok(Some(message(head.opcode, self.hand_over(payload))));
@@ -243,8 +243,8 @@ impl Inbound {
         })
     }
 
-    /// The payload in a buffer of its own. The shorter one is copied of the payload and what lies
-    /// behind it, so that a buffer full of short frames is read in one pass.
+    /// Splits the payload from the bytes behind it, and copies whichever is shorter. So a buffer
+    /// full of short frames is read in one pass.
     fn hand_over(&mut self, payload: Range<usize>) -> Bytes {
         if self.buffer.len() - payload.end > payload.len() {
             let mut own = self.spare.lend(self.room.max(payload.len()));
@@ -264,7 +264,8 @@ fn message(kind: u8, payload: Bytes) -> Message {
     if kind == opcode::TEXT { Message::Text(payload) } else { Message::Binary(payload) }
 }
 
-/// The code of a close frame, if it may be sent at all (section 7.4).
+/// The code of a close frame; None if it has none. A code that must not be sent is a fault (section
+/// 7.4).
 fn close_code(payload: &[u8]) -> Result<Option<u16>, Fault> {
     let Some((code, reason)) = payload.split_first_chunk() else {
         return if payload.is_empty() {
@@ -281,7 +282,7 @@ fn close_code(payload: &[u8]) -> Result<Option<u16>, Fault> {
     }
 }
 
-/// Takes the mask off bytes that begin `offset` bytes into the payload.
+/// Removes the mask from bytes that begin `offset` bytes into the payload.
 fn unmask(bytes: &mut [u8], mut mask: [u8; 4], offset: usize) {
     mask.rotate_left(offset % 4);
     let key = u32::from_ne_bytes(mask);

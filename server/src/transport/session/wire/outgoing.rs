@@ -2,10 +2,11 @@
 
 use bytes::{Bytes, BytesMut};
 
-/// Most bytes of the head of a server's frame.
+/// The most bytes in the header of a server's frame.
 pub(in crate::transport::session) const OUT_HEAD_MAX: usize = 10;
 
-/// The head of a server's frame, whole and unmasked, at the end of the array, and its length.
+/// The header of an unfragmented, unmasked frame. It stands at the end of the array; the second
+/// value is its length.
 pub(in crate::transport::session) fn out_head(
     opcode: u8,
     payload_len: usize,
@@ -23,7 +24,7 @@ pub(in crate::transport::session) fn out_head(
     (head, 2 + extra)
 }
 
-/// A server's frame of its own memory.
+/// A whole frame in newly allocated memory.
 pub(in crate::transport::session) fn frame(opcode: u8, payload: &[u8]) -> Bytes {
     let (head, len) = out_head(opcode, payload.len());
     let mut frame = BytesMut::with_capacity(len + payload.len());
