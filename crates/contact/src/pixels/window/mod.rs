@@ -1,7 +1,9 @@
 //! The window: the part of the skin near objects, its pixels, and the vertices that move them.
 
+mod close;
 mod gaps;
 mod hats;
+mod known;
 mod taken;
 mod vertices;
 
@@ -9,6 +11,8 @@ use super::convolution::Cells;
 use super::{PixelSkin, PixelSpacing};
 use crate::model::ContactModel;
 use crate::push::Push;
+use close::Close;
+use known::Known;
 use papilla_atlas::MAP_SIDE_PX;
 
 /// Pixels of the map between the window and itself, where it repeats.
@@ -54,6 +58,8 @@ pub(super) struct Window {
     shares: Vec<f32>,
     /// Pixels, as bits, all of whose shares lie on the skin.
     is_inner: Vec<u64>,
+    /// What is known of them at rest.
+    known: Known,
     /// Pixels, as bits, that are looked at.
     looked_at: Vec<u64>,
     /// Vertices of the pixels' stencils, and where each stands among them.
@@ -72,6 +78,7 @@ pub(super) struct Window {
     hat_mpa: Vec<f32>,
     hat_n: Vec<f32>,
     push: Push,
+    close: Close,
     /// Tiles of the compliance that are displaced.
     moving: Vec<u32>,
 }
@@ -108,6 +115,7 @@ impl Window {
             solved_for,
             shares: spacing.shares(),
             is_inner: vec![0; pixels.div_ceil(64)],
+            known: Known::new(&skin.rest_mm),
             looked_at: vec![0; pixels.div_ceil(64)],
             ids: Vec::with_capacity(vertices),
             place: vec![NONE; vertices],
@@ -121,6 +129,7 @@ impl Window {
             hat_mpa: zeros(),
             hat_n: zeros(),
             push: Push::new(model),
+            close: Close::new(vertices),
             moving: Vec::with_capacity(vertices),
         };
         window.note_inner(skin);

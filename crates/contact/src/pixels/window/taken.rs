@@ -89,29 +89,45 @@ impl Window {
     }
 
     /// Takes those of them that things are near. A distance changes no faster than a place, so
-    /// that most follow from the one before.
+    /// that most follow from the one before, or from the frames before: then each counts as asked, as the
+    /// budget has to be the same wherever a frame's memory comes from.
     fn take_near(&mut self, skin: &PixelSkin, view: View<'_>, effort: &mut Effort) {
         let mut asked: Option<([f32; 3], f64)> = None;
+        let is_followed = self.known.follow(view);
         for (word, (bits, solved_for)) in self.looked_at.iter().zip(&self.solved_for).enumerate() {
             let mut bits = bits & solved_for;
             while bits != 0 {
                 let entry = 64 * word + bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 let at = skin.rest_mm[entry];
-                let told = asked.and_then(|(from, gap_mm)| {
+                let follows = || {
+                    let (from, gap_mm) = asked?;
                     let square: f32 = (0..3).map(|i| (at[i] - from[i]).powi(2)).sum();
                     let away = f64::from(square.sqrt());
                     let is_near = gap_mm + away < REACH_MM;
                     (is_near || gap_mm - away > REACH_MM).then_some(is_near)
-                });
-                let is_near = told.unwrap_or_else(|| {
-                    if view.is_spent(effort) {
-                        return true;
-                    }
+                };
+                let told = if is_followed {
+                    let is_spent = view.is_spent(effort);
                     view.count(1, effort);
+                    let known = self.known.is_nearer(entry, REACH_MM as f32);
+                    if is_spent { Some(true) } else { known.or_else(follows) }
+                } else {
+                    follows()
+                };
+                let is_near = told.unwrap_or_else(|| {
+                    if !is_followed {
+                        if view.is_spent(effort) {
+                            return true;
+                        }
+                        view.count(1, effort);
+                    }
                     let nearest = view.nearest_at(at.map(f64::from));
                     view.count_more(nearest.map_or(0, |nearest| nearest.asked), effort);
                     let gap_mm = nearest.map_or(f64::INFINITY, |nearest| nearest.gap_mm);
+                    if is_followed {
+                        self.known.note(entry, gap_mm);
+                    }
                     asked = Some((at, gap_mm));
                     gap_mm < REACH_MM
                 });

@@ -14,9 +14,12 @@ impl Window {
         model: &ContactModel,
         amplitudes: Option<&mut Amplitudes>,
     ) {
-        let Self { push, force_n, shear_n, moving, ids, linear, .. } = self;
+        let Self { push, close, force_n, shear_n, moving, ids, linear, .. } = self;
         push.take(model, |vertex| [0, 1, 2].map(|i| force_n[i][vertex] + shear_n[i][vertex]));
-        push.displace(model, [moving, ids], linear);
+        let forces = (push.vertices(), push.forces());
+        if !close.displace(model, forces, ids, linear) {
+            push.displace(model, [moving, ids], linear);
+        }
         self.correct(skin, model);
         let Self { push, ids, linear, moved, .. } = self;
         push.add_second_order(model, amplitudes, ids, linear, moved);
