@@ -268,7 +268,8 @@ fn fingerprint(spec: &CampaignSpec, atlas: &Atlas) -> Result<String, OutputError
     }
     // A shard does not depend on how many follow, nor on which of them are held out: a campaign can
     // be gone on with after more presses were asked for.
-    let each = CampaignSpec { presses: 0, test_fraction: 0.0, ..spec.clone() };
+    let each =
+        CampaignSpec { presses: 0, test_fraction: Some(0.0), test_one_in: None, ..spec.clone() };
     let text = serde_json::to_string(&(each, pictures, atlas.hash(), FORMAT, SOFTWARE))
         .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
     Ok(sha256_hex(text.as_bytes()))

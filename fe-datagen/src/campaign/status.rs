@@ -133,6 +133,13 @@ impl StatusReader {
         })
     }
 
+    /// Indenter, as a place among the campaign's, and processor time (s) of each indentation that
+    /// [`Self::read`] has found solved by one process from its beginning.
+    pub fn processor_s(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let solved = self.known.values().filter(|state| !state.is_failed());
+        solved.filter_map(|state| Some((state.press.candidate, state.processor_s?)))
+    }
+
     /// Processes that have not finished their slices.
     fn processes(&self) -> Result<Vec<Heard>, CampaignError> {
         let all = Beat::all(self.workspace.folder())?;

@@ -178,17 +178,31 @@ pub struct HeldOut {
 /// Divides the indentations: the `test_fraction` (rounded; at least one, and never
 /// all, when it is above 0) with the smallest SHA-256 of seed and id is held
 /// out. Whole indentations, since two depths of one indentation are near-copies.
+///
+/// With `test_one_in` it is the one with the smallest SHA-256 of each so many in their order, so that
+/// an indentation stays on its side when more are asked for.
 pub fn held_out(spec: &CampaignSpec) -> HeldOut {
-    let mut order: Vec<usize> = (0..spec.presses).collect();
-    order.sort_by_cached_key(|id| {
+    let by_hash = |id: &usize| {
         let mut hash = Sha256::new();
         hash.update(b"papilla split\0");
         hash.update(spec.seed.to_le_bytes());
         hash.update((*id as u64).to_le_bytes());
         <[u8; 32]>::from(hash.finalize())
-    });
-    let held_out = match (spec.test_fraction * spec.presses as f64).round() as usize {
-        count if spec.test_fraction > 0.0 && spec.presses > 1 => count.clamp(1, spec.presses - 1),
+    };
+    let mut order: Vec<usize> = (0..spec.presses).collect();
+    if let Some(block) = spec.test_one_in {
+        // What is left of a block at the end is trained on.
+        let test: Vec<usize> = order
+            .chunks_exact(block.max(1))
+            .filter_map(|block| block.iter().copied().min_by_key(by_hash))
+            .collect();
+        order.retain(|id| test.binary_search(id).is_err());
+        return HeldOut { train: order, test };
+    }
+    order.sort_by_cached_key(by_hash);
+    let share = spec.test_fraction.unwrap_or_default();
+    let held_out = match (share * spec.presses as f64).round() as usize {
+        count if share > 0.0 && spec.presses > 1 => count.clamp(1, spec.presses - 1),
         _ => 0,
     };
     let mut test = order[..held_out].to_vec();

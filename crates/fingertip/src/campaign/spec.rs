@@ -90,8 +90,13 @@ pub struct CampaignSpec {
     /// Depths that differ from press to press; or else `depths_mm`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depths: Option<DepthRange>,
-    /// Share of the indentations that is held out, 0 to less than 1.
-    pub test_fraction: f64,
+    /// Share of the indentations that is held out, 0 to less than 1; or else `test_one_in`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test_fraction: Option<f64>,
+    /// Of each so many indentations one is held out, the same ones however many follow; or else
+    /// `test_fraction`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test_one_in: Option<usize>,
     /// Density of the mesh; medium if not given.
     #[serde(default)]
     pub density: Density,
@@ -150,6 +155,8 @@ const INDENTERS_MAX: usize = 1000;
 const SHARE_MAX: u32 = 10_000;
 /// Most states of one indentation.
 const STATES_MAX: usize = 1000;
+/// Most indentations of which one is held out.
+const TEST_ONE_IN_MAX: usize = 1000;
 /// Largest offset, mm: the finger is 25 mm long.
 const OFFSET_MAX_MM: f64 = 25.0;
 /// Longest slide, mm: the pad is some 12 mm wide.
@@ -164,14 +171,22 @@ impl CampaignSpec {
     pub fn read(path: &Path) -> Result<Self, SpecError> {
         let text = papilla_json::read_text(path)
             .map_err(|source| SpecError::Read { path: path.into(), source })?;
-        if has_key(&text, "geometry") {
+        Self::parse(path, &text)
+    }
+
+    /// Reads and checks the text of a campaign file; `path` is where it stands, or would.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, SpecError> {
+        if has_key(text, "geometry") {
             let message = "is a scene, not a campaign: `fe-datagen explain` and `solve` take it";
             return Err(SpecError::Spec { path: path.into(), message: message.into() });
         }
-        let mut spec: Self = toml::from_str(&text)
+        let mut spec: Self = toml::from_str(text)
             .map_err(|e| SpecError::Spec { path: path.to_path_buf(), message: e.to_string() })?;
         spec.folder = path.parent().unwrap_or(Path::new("")).into();
-        spec.take_finger(&text).map_err(|source| SpecError::Finger {
+        spec.take_finger(text).map_err(|source| SpecError::Finger {
             campaign: spec.name.clone(),
             source: Box::new(source),
         })?;
@@ -245,11 +260,7 @@ impl CampaignSpec {
             "presses",
             format!("is {}, it has to be 1 to {PRESSES_MAX}", self.presses),
         )?;
-        require(
-            (0.0..1.0).contains(&self.test_fraction),
-            "test_fraction",
-            format!("is {}, it has to be 0 or more and less than 1", self.test_fraction),
-        )?;
+        self.validate_held_out()?;
         require(
             self.depths_mm.is_empty() != self.depths.is_none(),
             "depths_mm",
@@ -282,6 +293,26 @@ impl CampaignSpec {
     fn require(&self, ok: bool, field: &str, message: String) -> Result<(), SpecError> {
         let campaign = self.name.clone();
         if ok { Ok(()) } else { Err(SpecError::Value { campaign, field: field.into(), message }) }
+    }
+
+    fn validate_held_out(&self) -> Result<(), SpecError> {
+        match (self.test_fraction, self.test_one_in) {
+            (Some(share), None) => self.require(
+                (0.0..1.0).contains(&share),
+                "test_fraction",
+                format!("is {share}, it has to be 0 or more and less than 1"),
+            ),
+            (None, Some(count)) => self.require(
+                (2..=TEST_ONE_IN_MAX).contains(&count),
+                "test_one_in",
+                format!("is {count}, it has to be 2 to {TEST_ONE_IN_MAX}"),
+            ),
+            _ => self.require(
+                false,
+                "test_fraction",
+                "has to be given, or else test_one_in: one of the two".into(),
+            ),
+        }
     }
 
     fn validate_slide(&self) -> Result<(), SpecError> {

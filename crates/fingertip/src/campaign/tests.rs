@@ -122,7 +122,7 @@ fn an_indentation_slides_at_its_deepest() {
 
 #[test]
 fn the_split_is_by_press_and_follows_the_seed() {
-    let spec = CampaignSpec { presses: 125, test_fraction: 0.2, ..spec() };
+    let spec = CampaignSpec { presses: 125, test_fraction: Some(0.2), ..spec() };
     let split = held_out(&spec);
     assert_eq!((split.train.len(), split.test.len()), (100, 25));
     let mut all = [split.train.clone(), split.test.clone()].concat();
@@ -130,15 +130,40 @@ fn the_split_is_by_press_and_follows_the_seed() {
     assert_eq!(all, (0..125).collect::<Vec<_>>());
     assert_eq!(split, held_out(&spec));
     assert_ne!(split.test, held_out(&CampaignSpec { seed: 9, ..spec.clone() }).test);
-    let two = held_out(&CampaignSpec { presses: 2, test_fraction: 0.2, ..spec });
+    let two = held_out(&CampaignSpec { presses: 2, test_fraction: Some(0.2), ..spec });
     assert_eq!((two.train.len(), two.test.len()), (1, 1));
+}
+
+#[test]
+fn one_of_each_five_is_held_out_and_stays_so_when_more_follow() {
+    let of = |presses| {
+        held_out(&CampaignSpec { presses, test_fraction: None, test_one_in: Some(5), ..spec() })
+    };
+    let most = of(100);
+    for presses in [4, 5, 9, 10, 25, 50, 100] {
+        let split = of(presses);
+        assert_eq!(split.test.len(), presses / 5);
+        let mut all = [split.train.clone(), split.test.clone()].concat();
+        all.sort_unstable();
+        assert_eq!(all, (0..presses).collect::<Vec<_>>());
+        let whole = presses / 5 * 5;
+        let first = |ids: &[usize]| ids.iter().copied().filter(|id| *id < whole).collect();
+        let nested: [Vec<usize>; 2] = [first(&most.train), first(&most.test)];
+        assert_eq!([first(&split.train), split.test], nested);
+    }
+    for block in 0..20 {
+        let own = 5 * block..5 * block + 5;
+        assert_eq!(most.test.iter().filter(|id| own.contains(*id)).count(), 1);
+    }
+    // Not always the same place of the five: that would be the same indenters.
+    assert!((0..5).all(|place| most.test.iter().any(|id| id % 5 == place)));
 }
 
 #[test]
 fn shipped_campaigns_are_readable() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns");
     let s1 = CampaignSpec::read(&folder.join("s1-graded.toml")).unwrap();
-    assert_eq!((s1.samples(), s1.test_fraction.to_bits()), (1000, 0.2f64.to_bits()));
+    assert_eq!((s1.samples(), s1.test_fraction.map(f64::to_bits)), (1000, Some(0.2f64.to_bits())));
     assert_eq!(CampaignSpec::read(&folder.join("smoke.toml")).unwrap().density, Density::Coarse);
     let broad = CampaignSpec::read(&folder.join("broad-graded.toml")).unwrap();
     let held = CampaignSpec::read(&folder.join("heldout-graded.toml")).unwrap();
@@ -171,7 +196,7 @@ fn bad_depths() -> Option<DepthRange> {
 #[test]
 fn senseless_campaigns_are_refused_by_field() {
     type Spoil = fn(&mut CampaignSpec);
-    let cases: [(Spoil, &str); 19] = [
+    let cases: [(Spoil, &str); 22] = [
         (|s| s.effects.push("viscoelastic".to_string().try_into().unwrap()), "viscoelastic"),
         (|s| s.effects.push("friction".to_string().try_into().unwrap()), "friction.coefficient"),
         (|s| s.indenter = None, "indenter"),
@@ -188,7 +213,10 @@ fn senseless_campaigns_are_refused_by_field() {
         (|s| s.presses = (1 << 20) + 1, "presses"),
         (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
         (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),
-        (|s| s.test_fraction = 1.0, "test_fraction"),
+        (|s| s.test_fraction = Some(1.0), "test_fraction"),
+        (|s| s.test_fraction = None, "test_fraction"),
+        (|s| s.test_one_in = Some(5), "test_fraction"),
+        (|s| (s.test_fraction, s.test_one_in) = (None, Some(1)), "test_one_in"),
         (
             |s| {
                 let plate = Plate { edge_radius_mm: 11.0, ..Plate::default() };

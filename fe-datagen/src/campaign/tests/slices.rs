@@ -46,7 +46,7 @@ fn slices_at_once_make_the_bytes_of_a_serial_run() {
 #[test]
 fn a_campaign_is_gone_on_with_after_more_presses_were_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let fewer = CampaignSpec { presses: 4, test_fraction: 0.5, ..spec() };
+    let fewer = CampaignSpec { presses: 4, test_fraction: Some(0.5), ..spec() };
     part(&fewer, folder.path(), &slice(1, 1), Trouble::None).unwrap();
     merge(&fewer, folder.path()).unwrap();
     assert!(files(folder.path()) != serial());
