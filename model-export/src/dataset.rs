@@ -5,6 +5,8 @@ use crate::ExportError;
 use crate::metrics::Ground;
 use crate::part::Part;
 use papilla_dataset::{Field, IndentationEntry, Maps, Shard};
+use papilla_fingertip::geometry::fingertip::FingertipShape;
+use papilla_fingertip::scene::Finger;
 use papilla_proto::{
     atlas::{Atlas, Patch},
     sdf::IndenterSpec,
@@ -25,6 +27,8 @@ struct Campaign {
     #[serde(default)]
     indenters: Vec<NamedIndenter>,
     friction: Option<Friction>,
+    /// Absent: the default finger.
+    finger_sha256: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -43,6 +47,8 @@ struct NamedIndenter {
 pub struct Dataset {
     files: papilla_dataset::Dataset,
     campaign: Campaign,
+    /// Of the finger that pressed; none if it is one of its own that has not been named.
+    shape: Option<FingertipShape>,
     /// Where errors are taken.
     pub ground: Ground,
     /// Draws pressure and SED.
@@ -65,7 +71,52 @@ impl Dataset {
         };
         let maps = Maps::read(folder, files.atlas())?;
         let ground = Ground::new(files.atlas(), maps.raster(Patch::Interface));
-        Ok(Self { files, campaign, ground, maps })
+        let shape = campaign.finger_sha256.is_none().then(FingertipShape::default);
+        Ok(Self { files, campaign, shape, ground, maps })
+    }
+
+    /// Takes the dimensions of the finger that it was solved on, from the finger's folder: where an
+    /// indenter first touches depends on them.
+    ///
+    /// # Errors
+    /// [`ExportError::Finger`] if it is no finger or another one.
+    pub fn on_finger(mut self, folder: &Path) -> Result<Self, ExportError> {
+        let refused = |reason: String| ExportError::Finger { path: folder.into(), reason };
+        let finger = Finger::read(folder).map_err(|error| refused(error.to_string()))?;
+        let (found, due) = (finger.sha256(), self.campaign.finger_sha256.as_deref());
+        match due {
+            Some(due) if due == found => {}
+            None if found == Finger::usual().sha256() => {}
+            _ => {
+                let due = due.unwrap_or("the default finger's");
+                return Err(refused(format!(
+                    "its dimensions and tissues have the hash {found}, and {} was solved on a \
+                     finger with {due}",
+                    self.folder().display()
+                )));
+            }
+        }
+        self.shape = Some(finger.shape);
+        Ok(self)
+    }
+
+    /// Hash of dimensions and tissues of the finger that it was solved on; none: the default one.
+    #[must_use]
+    pub fn finger_sha256(&self) -> Option<&str> {
+        self.campaign.finger_sha256.as_deref()
+    }
+
+    /// Dimensions of the finger that it was solved on.
+    ///
+    /// # Errors
+    /// [`ExportError::DatasetFile`] if it was solved on a finger of its own, which has not been named.
+    pub fn shape(&self) -> Result<&FingertipShape, ExportError> {
+        self.shape.as_ref().ok_or_else(|| ExportError::DatasetFile {
+            path: self.folder().join("manifest.json"),
+            reason: "it was solved on another finger than the default one, which the command has \
+                     to know: name its folder with --finger"
+                .into(),
+        })
     }
 
     /// The folder it is in.

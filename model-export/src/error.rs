@@ -57,6 +57,14 @@ pub enum ExportError {
         /// What is wrong with it.
         reason: String,
     },
+    /// The finger cannot be read, or is not the dataset's.
+    #[error("{path}: {reason}")]
+    Finger {
+        /// Its folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// Model and dataset (or two files) belong to different atlases.
     #[error(
         "{what} is of atlas {found}, the models are of atlas {expected}; they do not go together"

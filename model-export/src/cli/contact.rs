@@ -4,7 +4,6 @@ use super::options::ContactOf;
 use super::{load_model, print_json};
 use papilla_engine::Backend;
 use papilla_model_export::contact::{Models, Row, Rung, errors_of, measure};
-use papilla_model_export::dataset::Dataset;
 use papilla_model_export::{ExportError, evaluate};
 use papilla_progress::Progress;
 use std::path::PathBuf;
@@ -16,6 +15,13 @@ pub(crate) struct Options {
     /// A network, `.onnx`, that makes SED of the pressure.
     #[arg(long, value_name = "FILE")]
     network: Option<PathBuf>,
+    /// The network was trained on another finger: measure what it is worth on this one by
+    /// similarity alone.
+    #[arg(long, requires = "network")]
+    similarity: bool,
+    /// Measure this method alone, such as "second order, pixels"; may be given several times.
+    #[arg(long = "method", value_name = "NAME", value_parser = rung)]
+    methods: Vec<Rung>,
     /// Take one state of so many.
     #[arg(long, default_value_t = 1, value_name = "N")]
     every: usize,
@@ -23,6 +29,14 @@ pub(crate) struct Options {
     /// beside the contact model. The first dataset is the one of which `ready` tells.
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
+}
+
+fn rung(name: &str) -> Result<Rung, String> {
+    let all = || Rung::ALL.map(|rung| format!("'{}'", rung.name())).join(", ");
+    Rung::ALL
+        .into_iter()
+        .find(|rung| rung.name() == name)
+        .ok_or_else(|| format!("there are: {}", all()))
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
@@ -35,15 +49,16 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         session = Some(network.session().map_err(failed)?);
     }
     let mut rows = Vec::new();
-    let progress = Progress::new("rungs", options.of.datasets.len() * Rung::ALL.len(), 0, json);
+    let rungs = if options.methods.is_empty() { &Rung::ALL[..] } else { &options.methods };
+    let progress = Progress::new("rungs", options.of.datasets.len() * rungs.len(), 0, json);
     for folder in &options.of.datasets {
-        let dataset = Dataset::open(folder)?;
+        let dataset = options.of.open(folder)?;
         models.require_atlas(&dataset, folder)?;
-        if let Some(network) = &network {
+        if let Some(network) = network.as_ref().filter(|_| !options.similarity) {
             let what = folder.display().to_string();
             evaluate::require_atlas(&what, dataset.atlas().hash(), network.info())?;
         }
-        for rung in Rung::ALL {
+        for &rung in rungs {
             let session = session.as_deref_mut();
             rows.push(measure(&models, rung, &dataset, session, options.every)?);
             progress.inc();

@@ -3,7 +3,6 @@
 use super::options::ContactOf;
 use super::print_json;
 use papilla_model_export::contact::{ContactMaps, Models};
-use papilla_model_export::dataset::Dataset;
 use papilla_model_export::write;
 use papilla_progress::Progress;
 use serde_json::json;
@@ -23,7 +22,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let progress = Progress::new("datasets", options.of.datasets.len(), 0, json);
     let mut written = Vec::new();
     for folder in &options.of.datasets {
-        let dataset = Dataset::open(folder)?;
+        let dataset = options.of.open(folder)?;
         models.require_atlas(&dataset, folder)?;
         let maps = ContactMaps::of(&models, &dataset)?;
         let name = folder.canonicalize()?;

@@ -22,6 +22,10 @@ pub(crate) struct Options {
     run: RunModel,
     /// Folder of the dataset, as `fe-datagen generate` writes it.
     dataset: PathBuf,
+    /// The model was trained on another finger: measure what it is worth on this one by similarity
+    /// alone, which is what a service answers that serves it so.
+    #[arg(long, conflicts_with = "card")]
+    similarity: bool,
     /// Which indentations: `test` (held out), `train` or `all`.
     #[arg(long, default_value_t = Part::Split(Split::Test), value_name = "SPLIT")]
     split: Part,
@@ -50,7 +54,8 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     if options.card.is_some() {
         require_held_out(options, info, &dataset)?;
     }
-    let subject = Subject { path: &options.run.model, model: model.as_ref() };
+    let subject =
+        Subject { path: &options.run.model, model: model.as_ref(), similarity: options.similarity };
     let other = second_engine(options)?;
     let mut difference = recorded_difference(options, model.as_ref())?;
     let evaluation = measure(options, &subject, other.as_deref(), &dataset, json)?;

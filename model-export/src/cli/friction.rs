@@ -5,7 +5,6 @@ use super::{load_model, print_json};
 use papilla_engine::Backend;
 use papilla_model_export::ExportError;
 use papilla_model_export::contact::Models;
-use papilla_model_export::dataset::Dataset;
 use papilla_model_export::friction::{RUBBING, Rubbed, measure};
 use papilla_progress::Progress;
 use std::path::PathBuf;
@@ -27,7 +26,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     let progress = Progress::new("rungs", options.of.datasets.len() * RUBBING.len(), 0, json);
     for folder in &options.of.datasets {
-        let dataset = Dataset::open(folder)?;
+        let dataset = options.of.open(folder)?;
         models.require_atlas(&dataset, folder)?;
         for rung in RUBBING {
             rows.push(measure(&models, rung, &dataset, session.as_mut())?);

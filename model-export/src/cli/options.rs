@@ -1,7 +1,9 @@
 //! Options that several commands have.
 
 use papilla_engine::Backend;
-use std::path::PathBuf;
+use papilla_model_export::ExportError;
+use papilla_model_export::dataset::Dataset;
+use std::path::{Path, PathBuf};
 
 /// Where the measured states and models are.
 #[derive(Debug, clap::Args)]
@@ -29,6 +31,20 @@ pub(super) struct ContactOf {
     /// Datasets of the same finger.
     #[arg(required = true)]
     pub(super) datasets: Vec<PathBuf>,
+    /// Folder of the finger, if it is not the default one.
+    #[arg(long, value_name = "FINGER")]
+    pub(super) finger: Option<PathBuf>,
+}
+
+impl ContactOf {
+    /// Opens one of the datasets, on its finger.
+    pub(super) fn open(&self, dataset: &Path) -> Result<Dataset, ExportError> {
+        let dataset = Dataset::open(dataset)?;
+        match &self.finger {
+            Some(finger) => dataset.on_finger(finger),
+            None => Ok(dataset),
+        }
+    }
 }
 
 /// A model, and what runs it.

@@ -163,13 +163,23 @@ impl Models {
         &self.finger
     }
 
-    /// Refuses a dataset of another atlas.
+    /// Refuses a dataset of another atlas, or of another finger with the same atlas, which does
+    /// not depend on bone and tissues.
     ///
     /// # Errors
-    /// [`ExportError::Contact`], with the dataset's path.
+    /// [`ExportError::Contact`] or [`ExportError::Finger`], with the dataset's path.
     pub fn require_atlas(&self, dataset: &Dataset, path: &Path) -> Result<(), ExportError> {
         let refused = |source| ExportError::Contact { path: path.to_owned(), source };
-        self.finger.require_atlas(dataset.atlas().hash()).map_err(refused)
+        self.finger.require_atlas(dataset.atlas().hash()).map_err(refused)?;
+        let (own, due) = (&self.finger.header().finger_sha256, dataset.finger_sha256());
+        if let Some(due) = due.filter(|due| !own.is_empty() && own != due) {
+            let reason = format!(
+                "was solved on the finger {due}, and the contact model is of {own}: make it anew \
+                 with `fe-datagen finger build`"
+            );
+            return Err(ExportError::Finger { path: path.to_owned(), reason });
+        }
+        Ok(())
     }
 
     pub(crate) fn solver(&self, rung: Rung) -> Option<Solver> {

@@ -4,7 +4,6 @@ use crate::ExportError;
 use crate::dataset::Dataset;
 use papilla_contact::Object;
 use papilla_dataset::{IndentationEntry, Shard};
-use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::scene::Pose;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_proto::atlas::Patch;
@@ -36,7 +35,7 @@ impl Placed {
         let straight = Approach::straight(spec, pose).map_err(|error| bad(error.to_string()))?;
         let approach = Approach { offset_mm: indentation.offset_mm, ..straight };
         let touch = if shard.cells.is_some() {
-            let contact = approach.contact_with(&FingertipShape::default(), &Drive::Depths(vec![]));
+            let contact = approach.contact_with(dataset.shape()?, &Drive::Depths(vec![]));
             contact.map(|contact| (contact.start, contact.direction))
         } else {
             on_vertices(dataset, spec, &approach)

@@ -133,6 +133,8 @@ pub struct Subject<'a> {
     pub path: &'a Path,
     /// The model.
     pub model: &'a dyn Model,
+    /// It may be of another atlas: that of the finger that it was trained on.
+    pub similarity: bool,
 }
 
 /// Measures `subject` on every sample of `part`.
@@ -151,7 +153,9 @@ pub fn run(
     mut step: impl FnMut(),
 ) -> Result<Evaluation, ExportError> {
     let info = subject.model.info();
-    require_atlas("the dataset", dataset.atlas().hash(), info)?;
+    if !subject.similarity {
+        require_atlas("the dataset", dataset.atlas().hash(), info)?;
+    }
     let mut bench = Bench::new(subject.model, subject.path)?;
     let mut second = other.map(|model| Bench::new(model, subject.path)).transpose()?;
     let mut difference = None;
