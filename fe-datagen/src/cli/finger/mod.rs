@@ -4,6 +4,7 @@ mod build;
 mod explain;
 mod from_surface;
 mod new;
+mod teach;
 
 use std::process::ExitCode;
 
@@ -23,6 +24,7 @@ enum Command {
     Explain(explain::Args),
     FromSurface(from_surface::Args),
     Build(build::Args),
+    Teach(teach::Args),
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
@@ -31,5 +33,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Command::Explain(args) => explain::run(args),
         Command::FromSurface(args) => from_surface::run(args),
         Command::Build(args) => build::run(args),
+        Command::Teach(args) => teach::run(args),
     }
 }

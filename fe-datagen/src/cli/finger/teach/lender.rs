@@ -1,0 +1,115 @@
+//! The networks that training begins with.
+
+use super::error::TeachError;
+use anyhow::Context as _;
+use papilla_output::atomic;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Median and 95th percentile.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Spread {
+    pub median: f64,
+    pub p95: f64,
+}
+
+/// What is read of a card.
+#[derive(Debug, Deserialize)]
+pub(super) struct Card {
+    pub onnx_sha256: String,
+    pub atlas_hash: String,
+    network: Network,
+    pub metrics: Metrics,
+    pub training: Training,
+}
+
+#[derive(Debug, Deserialize)]
+struct Network {
+    kind: String,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Metrics {
+    pub relative_l2: Spread,
+}
+
+/// Absent numbers are those of models that learnt nothing.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Training {
+    pub seconds: f64,
+    epochs: f64,
+    presses: Presses,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Presses {
+    fit: f64,
+}
+
+/// A network of another finger, which the training begins with.
+#[derive(Debug)]
+pub(super) struct Lender {
+    pub name: String,
+    pub onnx: PathBuf,
+    pub card: Card,
+}
+
+/// Kind of network that can be trained on.
+const TRAINABLE: &str = "map_net";
+
+impl Lender {
+    pub(super) fn read(folder: &Path, name: &str) -> anyhow::Result<Self> {
+        let onnx = folder.join(format!("{name}.onnx"));
+        let path = folder.join(format!("{name}.json"));
+        if !onnx.is_file() || !path.is_file() {
+            return Err(TeachError::NoNetwork { file: onnx, known: names(folder)? }.into());
+        }
+        let card: Card = atomic::read_json(&path)?;
+        if card.network.kind != TRAINABLE {
+            return Err(TeachError::NotTrainable { card: path, kind: card.network.kind }.into());
+        }
+        Ok(Self { name: name.to_owned(), onnx, card })
+    }
+
+    /// Core seconds of an epoch over one press, where it was trained.
+    pub(super) fn seconds_per_press_and_epoch(&self) -> f64 {
+        let Training { seconds, epochs, presses } = &self.card.training;
+        seconds / (epochs * presses.fit).max(1.0)
+    }
+}
+
+/// Refuses networks of another finger in a bundle, but for those that are going to be replaced.
+pub(super) fn refuse_strangers(
+    folder: &Path,
+    atlas_hash: &str,
+    replaced: &[Lender],
+) -> anyhow::Result<()> {
+    for name in names(folder)? {
+        if replaced.iter().any(|lender| lender.name == name) {
+            continue;
+        }
+        let file = folder.join(format!("{name}.onnx"));
+        let card: Card = atomic::read_json(&folder.join(format!("{name}.json")))?;
+        if card.atlas_hash != atlas_hash {
+            return Err(TeachError::Stranger { file, name, found: card.atlas_hash }.into());
+        }
+    }
+    Ok(())
+}
+
+/// Names of the networks in a folder, in their order.
+fn names(folder: &Path) -> anyhow::Result<Vec<String>> {
+    let entries = std::fs::read_dir(folder)
+        .with_context(|| format!("{} cannot be listed", folder.display()))?;
+    let mut names = Vec::new();
+    for entry in entries {
+        let path = entry?.path();
+        if path.extension().is_some_and(|ending| ending == "onnx") {
+            names.extend(path.file_stem().map(|name| name.to_string_lossy().into_owned()));
+        }
+    }
+    names.sort_unstable();
+    Ok(names)
+}
