@@ -1,6 +1,6 @@
 //! How close an answer is to the truth. All slices have the length of the mask.
 
-/// `|found - due| / |due|` over the pixels of the mask; 0 where nothing is due and found.
+/// Relative L2 error `|found - due| / |due|` over the pixels of the mask; 0 if both are zero there.
 #[must_use]
 pub fn relative_l2(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
     let (mut difference, mut size) = (0.0, 0.0);
@@ -11,7 +11,8 @@ pub fn relative_l2(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
     if difference > 0.0 { (difference / size.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 }
 }
 
-/// `sum found due / sum due^2` over the pixels of the mask; 1 where nothing is due.
+/// `sum found due / sum due^2` over the pixels of the mask: the part of the true map `due` that
+/// `found` holds. 1 if `due` is zero there.
 #[must_use]
 pub fn share(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
     let (mut common, mut size) = (0.0, 0.0);

@@ -5,7 +5,7 @@ use std::{fmt, str::FromStr};
 /// What runs the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Backend {
-    /// tract: pure Rust, always there.
+    /// tract: pure Rust, always available.
     #[default]
     Tract,
     /// ONNX Runtime: needs the cargo feature `ort` and the shared library that

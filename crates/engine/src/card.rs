@@ -22,30 +22,31 @@ pub struct Card {
     pub bytes: u64,
     /// Hash of the atlas whose maps it takes and gives.
     pub atlas_hash: String,
-    /// Effects its training data have.
+    /// Effects of the physics in its training data.
     pub effects: Vec<String>,
     /// Kind and size of the network.
     pub network: Value,
     /// Least and greatest pressure of the training data, Pa.
     pub pressure_range_pa: [f32; 2],
-    /// Roughest and heaviest map of the training data: what is beyond is flagged. Absent from
-    /// models that were fitted to no maps, and until `model-export patterns` has looked.
+    /// Greatest statistics of the training's pressure maps; a map beyond them is flagged. Absent
+    /// from models that were not fitted to maps, and until `model-export patterns` has measured
+    /// them.
     #[serde(rename = "pattern_max", default, skip_serializing_if = "Option::is_none")]
     pub input_statistics_max: Option<InputStatistics>,
-    /// Greatest SED of a map over its greatest pressure squared, of all the training data, 1/MPa: an
-    /// answer far beyond it is flagged. Absent as above.
+    /// The greatest ratio, over the maps of the training data, of a map's greatest SED to its
+    /// greatest pressure squared, 1/MPa. An answer far beyond it is flagged. Absent as above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub response_max_per_mpa: Option<f32>,
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
-    /// SHA-256 of the dataset it was trained on, of several that of their hashes one after
-    /// another.
+    /// SHA-256 of the dataset it was trained on. If there were several, SHA-256 of their hashes
+    /// joined in order.
     pub dataset_sha256: String,
     /// How it was trained.
     pub training: Value,
     /// Accuracy on held-out indentations.
     pub metrics: Metrics,
-    /// How long one map takes.
+    /// Time of one inference.
     pub latency_ms: Latency,
     /// Greatest difference from ONNX Runtime over all samples, relative to the greatest
     /// value of each sample; absent if it was not measured.
@@ -66,8 +67,8 @@ pub struct Metrics {
     pub samples: usize,
     /// `|p - t| / |t|` over the pixels of the interface.
     pub relative_l2: Spread,
-    /// The same where the truth is below 10 % of its maximum; absent if no sample has such
-    /// pixels with anything in them.
+    /// The same over pixels where the truth is below 10 % of its maximum. Absent if no sample has
+    /// such pixels with SED above zero.
     pub far_field_relative_l2: Option<Spread>,
     /// `|max p - max t| / max t`.
     pub peak_error: Spread,
@@ -109,7 +110,7 @@ pub struct Similarity {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Latency {
-    /// What ran it, with version.
+    /// The backend that ran it, with its version.
     pub backend: String,
     /// Threads it ran on.
     pub threads: usize,
@@ -148,7 +149,8 @@ impl Card {
         crate::info::datasets(&self.dataset_sha256, &self.training)
     }
 
-    /// Whether it learnt the pressure that the service's own contact makes, beside FE's.
+    /// Whether its training included pressure from the service's own contact methods, beside FE
+    /// pressure.
     #[must_use]
     pub fn knows_contact(&self) -> bool {
         self.training.get("contact").is_some()
@@ -201,15 +203,15 @@ impl Card {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Index {
-    /// The model to take unasked; one of `models`.
+    /// The default model; one of `models`.
     pub default: String,
     /// Names of all models; each has `NAME.onnx` and `NAME.json` beside the index.
     pub models: Vec<String>,
     /// Those of `models` that a service loads when a client first names them; no budget picks them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub on_demand: Vec<String>,
-    /// The finger whose presses trained those models whose atlas is not the one beside the index, by
-    /// its name: they serve this finger by similarity alone. None: there are no such models.
+    /// Name of the finger whose simulations trained those models whose atlas is not the one beside
+    /// the index. They serve this finger by similarity alone. None: there are no such models.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trained_on: Option<String>,
 }
@@ -218,8 +220,8 @@ impl Index {
     /// Reads the index.
     ///
     /// # Errors
-    /// [`EngineError::BadIndex`] if it is not JSON of this shape, lists nothing, names a default or
-    /// a model to load on demand that is not in the list, or the default as one of the latter.
+    /// [`EngineError::BadIndex`] if it is not JSON of this shape, if `models` lacks the default or
+    /// a name in `on_demand`, or if the default is in `on_demand`.
     pub fn from_json(text: &str) -> Result<Self, EngineError> {
         let index: Self = json::read(text.as_bytes())
             .map_err(|error| EngineError::BadIndex { reason: error.to_string() })?;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use std::{fmt, str::FromStr};
 
 impl Backend {
-    /// Whether this program can run it here; the first question opens the library.
+    /// Requires that this program can use the backend here. The first call opens the library.
     ///
     /// # Errors
     /// [`EngineError::BackendMissing`]: it was not built in, or its library is missing or too
@@ -32,7 +32,7 @@ pub(crate) fn not_built(backend: Backend) -> EngineError {
 /// Which backend is to run a model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Choice {
-    /// The one that is faster here, of those that are there.
+    /// The fastest of the available backends on this machine.
     #[default]
     Auto,
     /// This one.
@@ -67,20 +67,21 @@ impl Serialize for Choice {
     }
 }
 
-/// Timed runs in each backend however slow they are.
+/// The fewest timed runs in each backend, however slow it is.
 const RUNS_MIN: usize = 2;
-/// Runs in each after which the faster one is known.
+/// The most timed runs in each backend.
 const RUNS_MAX: usize = 50;
-/// The backends' answers may differ by so much of the greatest value; the shipped models differ by
-/// 1e-5 at most.
+/// Greatest accepted difference between the answers of two backends, relative to the greatest
+/// value. The shipped models differ by 1e-5 at most.
 const DIFFERENCE_MAX: f32 = 1e-3;
 
 impl Choice {
-    /// Loads a model as [`load_with`] does. [`Choice::Auto`] measures every backend that is there
-    /// for about `time`, on this thread, and keeps the faster one; with no time it takes tract.
+    /// Loads a model as [`load_with`] does. [`Choice::Auto`] times every available backend on this
+    /// thread, in about `time` altogether, and keeps the faster one. It takes tract if `time` is
+    /// zero, or if ONNX Runtime is missing, fails or answers differently.
     ///
     /// # Errors
-    /// As [`load_with`]; of [`Choice::Auto`] tract's alone.
+    /// As [`load_with`]. With [`Choice::Auto`] only an error of tract is returned.
     pub fn load(
         self,
         onnx: &[u8],
@@ -120,8 +121,8 @@ impl Choice {
     }
 }
 
-/// Time that this thread has had of a processor: on a busy machine a run is interrupted more often
-/// than not. Where the system does not tell (Windows), time that has passed.
+/// Processor time of this thread. Unlike wall time it does not count interruptions, which are
+/// frequent on a busy machine. Where the system does not tell it (Windows), wall time is used.
 #[cfg(unix)]
 #[must_use]
 pub fn processor_time() -> Duration {
@@ -130,7 +131,7 @@ pub fn processor_time() -> Duration {
     Duration::new(seconds, u32::try_from(now.tv_nsec).unwrap_or_default())
 }
 
-/// Time that has passed since this was first asked: the system does not tell the thread's own.
+/// Wall time since the first call, since the system does not tell the thread's own time.
 #[cfg(not(unix))]
 #[must_use]
 pub fn processor_time() -> Duration {
@@ -138,11 +139,12 @@ pub fn processor_time() -> Duration {
     BEGUN.get_or_init(Instant::now).elapsed()
 }
 
-/// Two models on the same map, in turn.
+/// A comparison of two models that run the same map alternately.
 struct Race {
-    /// Processor time of each: what disturbs a run makes it slower, never faster.
+    /// Least processor time of each. The least is used since disturbances make a run slower, never
+    /// faster.
     least: [Duration; 2],
-    /// Greatest difference between the answers, over the greatest value.
+    /// Greatest difference between the answers, relative to the greatest value.
     difference: f32,
 }
 

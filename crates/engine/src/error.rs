@@ -12,7 +12,7 @@ pub enum EngineError {
     NotOnnx {
         /// Length of the file, bytes.
         bytes: usize,
-        /// What the decoder met.
+        /// The decoder's message.
         reason: String,
     },
     /// A required `metadata_props` entry is not there.
@@ -69,7 +69,7 @@ pub enum EngineError {
         /// What is wrong with it.
         reason: String,
     },
-    /// An operator that no model needs, or that could make any amount of data of little.
+    /// An operator that no model needs, or whose output could be large although the file is small.
     #[error(
         "node '{node}' of the model is of the kind '{kind}': {reason}; docs/reference/models.md lists what is taken"
     )]
@@ -90,7 +90,7 @@ pub enum EngineError {
         node: String,
         /// Values of its output.
         values: String,
-        /// Most values that it might have.
+        /// The most values that it may have.
         limit: i64,
     },
     /// The card cannot be read.
@@ -98,25 +98,25 @@ pub enum EngineError {
         "the model's card is unreadable: {reason}; write it again with `model-export evaluate`"
     )]
     BadCard {
-        /// What the reader met.
+        /// The reader's message.
         reason: String,
     },
     /// The index of the models cannot be read.
     #[error("the list of models is unreadable: {reason}; `model-export index` writes it")]
     BadIndex {
-        /// What the reader met.
+        /// The reader's message.
         reason: String,
     },
     /// The laws of errors cannot be read.
     #[error("the laws of errors are unreadable: {reason}; `model-export calibrate` writes them")]
     BadErrors {
-        /// What the reader met.
+        /// The reader's message.
         reason: String,
     },
     /// The ladder cannot be read.
     #[error("the ladder is unreadable: {reason}; measure it again with `model-export ladder`")]
     BadLadder {
-        /// What the reader met.
+        /// The reader's message.
         reason: String,
     },
     /// The card belongs to another model.
@@ -131,12 +131,12 @@ pub enum EngineError {
         /// Value of the model.
         model: String,
     },
-    /// The backend is not there.
+    /// The backend is not available.
     #[error("the backend '{backend}' is not available: {reason}")]
     BackendMissing {
         /// Backend asked for.
         backend: Backend,
-        /// Why it is not there.
+        /// Why it is not available.
         reason: String,
     },
     /// The backend refused the model or failed at run time.
@@ -144,9 +144,9 @@ pub enum EngineError {
     Backend {
         /// Backend concerned.
         backend: Backend,
-        /// What it was to do.
+        /// What it was doing.
         action: &'static str,
-        /// Its own words.
+        /// The backend's own message.
         reason: String,
     },
     /// The backend panicked; the panic was caught.
@@ -154,7 +154,7 @@ pub enum EngineError {
     Panicked {
         /// Backend concerned.
         backend: Backend,
-        /// What it was to do.
+        /// What it was doing.
         action: &'static str,
         /// Message of the panic.
         reason: String,

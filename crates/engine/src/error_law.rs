@@ -28,7 +28,8 @@ use papilla_proto::input_statistics::PressedCells;
 use papilla_proto::{LikelyError, Look, MAP_SIDE_PX, json};
 use serde::{Deserialize, Serialize};
 
-/// What an answer shows that tells of its error. Without unit: logarithms, shares, counts.
+/// A number that an answer shows and on which its error depends: a logarithm, share or count,
+/// without unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fact {
@@ -36,19 +37,23 @@ pub enum Fact {
     Peak,
     /// Logarithm of the greatest pressure over the mean pressure.
     Concentration,
-    /// Logarithm of the sum of the pressures, MPa px; of a force its size, N.
+    /// For SED the logarithm of the sum of the pressures, MPa px; for a force the logarithm of its
+    /// size, N.
     Load,
-    /// Logarithm of the standard deviation of the pressure along the contact, px.
+    /// Logarithm of the standard deviation of the pressure's places along the contact's longest
+    /// direction, px.
     Length,
-    /// Logarithm of the roughness.
+    /// Logarithm of the map's roughness ([`papilla_proto::InputStatistics`]).
     Roughness,
-    /// How many cells deep the contact lies in the region that the training pressed.
+    /// How many cells there are, at least, between the contact and the edge of the region that the
+    /// training pressed.
     Inside,
     /// Share of the pressed cells outside of that region.
     Strange,
     /// Logarithm of the sum of SED over the sum of the squared pressures, 1/MPa.
     Energy,
-    /// How far the centre of pressure is towards the tip of the finger, beyond the pad's middle.
+    /// How far the centre of pressure lies beyond the pad's middle part towards the tip of the
+    /// finger; 0 within it.
     Tip,
     /// The same towards a side.
     Side,
@@ -57,10 +62,10 @@ pub enum Fact {
 }
 
 impl Fact {
-    /// How many there are.
+    /// Number of facts.
     const COUNT: usize = Self::Heel as usize + 1;
 
-    /// Those of SED.
+    /// The facts on which the error of SED may depend.
     pub const OF_SED: [Self; 11] = [
         Self::Peak,
         Self::Concentration,
@@ -75,11 +80,11 @@ impl Fact {
         Self::Heel,
     ];
 
-    /// Those of a force that contact found.
+    /// The facts on which the error of a force from a contact method may depend.
     pub const OF_FORCE: [Self; 4] = [Self::Load, Self::Tip, Self::Side, Self::Heel];
 }
 
-/// The facts of one answer; those that are not known are no numbers.
+/// The facts of one answer. A fact that is not known is NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facts([f32; Fact::COUNT]);
 
@@ -89,17 +94,17 @@ impl Default for Facts {
     }
 }
 
-/// Where a centre of pressure begins to be far out towards the tip and the hand, and towards a side,
-/// px from the middle of the map, and the unit of how far.
+/// Distances from the middle of the map at which a centre of pressure counts as far out: along the
+/// finger and across it, px. The first is also the unit of the facts `Tip`, `Side` and `Heel`.
 const FAR_PX: [f32; 2] = [40.0, 20.0];
-/// The same, mm: a pixel is .137 mm wide on average.
+/// The same in mm; a pixel is 0.137 mm wide on average.
 const FAR_MM: [f32; 2] = [5.5, 2.75];
-/// Where the middle of the map lies from the tip, mm along the finger.
+/// Distance of the middle of the map from the tip, along the finger, mm.
 const MIDDLE_MM: f32 = 11.5;
 
 impl Facts {
-    /// Those of a pressure map (`look`, greatest pressure) and of the SED under it (the sum over the
-    /// map); `trained` is where the training pressed.
+    /// The facts of a pressure map (`look` and its greatest pressure) and of the SED under it
+    /// (`sed_sum`, the sum over the map, J/m3). `trained` are the cells that the training pressed.
     #[must_use]
     pub fn of_sed(look: &Look, peak_pa: f32, sed_sum: f32, trained: PressedCells) -> Self {
         let mut facts = Self::default();
@@ -119,8 +124,8 @@ impl Facts {
         facts
     }
 
-    /// Those of a force on a finger of reference width and stiffness: its size, and the centre of
-    /// pressure in the finger's frame.
+    /// The facts of a force on a finger of reference width and stiffness, from its size and the
+    /// centre of pressure in the finger's frame.
     #[must_use]
     pub fn of_force(force_n: f32, centre_mm: [f32; 3]) -> Self {
         let mut facts = Self::default();
@@ -130,20 +135,21 @@ impl Facts {
         facts
     }
 
-    /// Where the centre of pressure is, from the middle, both in units of the first of `far`.
+    /// Sets the facts about the centre of pressure. `along` and `aside` are its distances from the
+    /// middle, in units of `far[0]`.
     fn place(&mut self, along: f32, aside: f32, far: [f32; 2]) {
         self.set(Fact::Tip, (-along - 1.0).max(0.0));
         self.set(Fact::Heel, (along - 1.0).max(0.0));
         self.set(Fact::Side, (aside.abs() - far[1] / far[0]).max(0.0));
     }
 
-    /// One of them; no number where it is not known.
+    /// One fact; NaN if it is not known.
     #[must_use]
     pub fn get(&self, fact: Fact) -> f32 {
         self.0[fact as usize]
     }
 
-    /// Notes one of them.
+    /// Sets one fact.
     pub fn set(&mut self, fact: Fact, value: f32) {
         self.0[fact as usize] = value;
     }
@@ -153,35 +159,36 @@ impl Facts {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Term {
-    /// Which.
+    /// The fact.
     pub fact: Fact,
-    /// Least and greatest for which the law holds: those of the calibration, with a margin.
+    /// Least value for which the law holds: that of the calibration, with a margin.
     pub least: f32,
-    /// See above.
+    /// Greatest value for which the law holds.
     pub most: f32,
-    /// Of the median.
+    /// Coefficient in the logarithm of the median.
     pub median: f32,
-    /// Of the bound over the median.
+    /// Coefficient in the logarithm of the bound over the median.
     pub bound: f32,
 }
 
-/// The law of one error; see the [module](self).
+/// The law of one kind of error; see the [module](self).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Law {
-    /// Logarithm of the median where all facts are 0.
+    /// Logarithm of the median if all facts are 0.
     pub median: f32,
-    /// That of the bound over the median.
+    /// Logarithm of the bound over the median if all facts are 0.
     pub bound: f32,
-    /// What facts add.
+    /// What each fact adds.
     pub terms: Vec<Term>,
 }
 
-/// A bound is at least so much above its median, as a logarithm: 5 %.
+/// Least logarithm of a bound over its median: a bound is at least 5 % above the median.
 pub const BOUND_LEAST: f32 = 0.05;
 
 impl Law {
-    /// The error of an answer that shows this; unknown beyond the calibration.
+    /// The error of an answer with these facts; unknown if the law [does not hold](Self::is_beyond)
+    /// for them.
     #[must_use]
     pub fn at(&self, facts: &Facts) -> LikelyError {
         if self.is_beyond(facts) {
@@ -195,15 +202,15 @@ impl Law {
         LikelyError { median: median.exp(), p90: bound.exp() }
     }
 
-    /// Whether a fact is not known, or beyond those of the calibration.
+    /// Whether a fact is not known, or lies outside the range of the calibration.
     #[must_use]
     pub fn is_beyond(&self, facts: &Facts) -> bool {
-        // NaN is in no range.
+        // A fact that is NaN is in no range.
         !self.terms.iter().all(|term| (term.least..=term.most).contains(&facts.get(term.fact)))
     }
 }
 
-/// The law of what contact by one method makes.
+/// The law of an error under contact by one method.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MethodLaw {
@@ -219,36 +226,36 @@ pub struct MethodLaw {
 pub struct NetworkLaws {
     /// Its name.
     pub name: String,
-    /// SHA-256 of its file; those of another file are passed over.
+    /// SHA-256 of its file. The laws are not used for another file.
     pub onnx_sha256: String,
-    /// Of SED where the pressure map is given, as FE's is.
+    /// The error of SED from a given pressure map, such as one from FE.
     pub given: Law,
-    /// Of SED where contact finds the pressure.
+    /// The error of SED from pressure that a contact method has found, method by method.
     pub contact: Vec<MethodLaw>,
 }
 
-/// What answers err: the file `errors.json` of a folder of models.
+/// The errors of answers: the file `errors.json` of a folder of models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorLaws {
     /// Version of this layout.
     pub format: u32,
-    /// Hash of the atlas of all that was calibrated.
+    /// Hash of the atlas on which all of it was calibrated.
     pub atlas_hash: String,
-    /// SHA-256 of the contact model's file; what was calibrated of another is passed over.
+    /// SHA-256 of the contact model's file. The laws under contact are not used with another file.
     pub contact_sha256: String,
-    /// Of SED, network by network.
+    /// The laws of SED, network by network.
     pub networks: Vec<NetworkLaws>,
-    /// Of the size of the force, method by method.
+    /// The laws of the size of the force, method by method.
     pub force: Vec<MethodLaw>,
 }
 
-/// How the pressure came about that a network turns into SED.
+/// Where the pressure came from that a network turns into SED.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way<'a> {
-    /// As a map.
+    /// The client gave it as a map.
     Given,
-    /// By contact, with the model whose file has this SHA-256.
+    /// This contact method found it, with the contact model whose file has this SHA-256.
     Contact(ContactMethod, &'a str),
 }
 
@@ -266,7 +273,8 @@ impl ErrorLaws {
         Err(EngineError::UnsupportedFormat { file: "errors.json", found: laws.format })
     }
 
-    /// The law of SED by the network whose file has this SHA-256; none if it was not calibrated.
+    /// The law of SED for the network whose file has this SHA-256. None: it was not calibrated this
+    /// way.
     #[must_use]
     pub fn sed(&self, onnx_sha256: &str, way: Way<'_>) -> Option<&Law> {
         let network = self.networks.iter().find(|laws| laws.onnx_sha256 == onnx_sha256)?;
@@ -276,7 +284,7 @@ impl ErrorLaws {
         }
     }
 
-    /// The law of the size of a force; none if it was not calibrated.
+    /// The law of the size of a force. None: it was not calibrated, or the pressure was given.
     #[must_use]
     pub fn force(&self, way: Way<'_>) -> Option<&Law> {
         match way {

@@ -9,16 +9,16 @@ use std::sync::Once;
 use tract_onnx::prelude::TractResult;
 
 thread_local! {
-    /// Whether this thread is within [`guarded`]: whoever called it is told of a panic.
+    /// Whether this thread is inside [`guarded`], whose caller gets a panic as an error.
     static IS_GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs tract's code and turns its errors and panics into ours.
+/// Runs tract's code, and turns its errors and panics into errors of this crate.
 ///
-/// tract reports most bad models as errors but asserts here and there (shape
-/// arithmetic, indexing), and a service must not fall to a model file. Nor does it print such a
-/// panic as if it were its own: the first call puts a hook before the one that is set, which is
-/// silent for threads that are in here.
+/// tract reports most bad models as errors, but asserts here and there (shape arithmetic,
+/// indexing), and a model file must not end a service. Such a panic is not printed either: the
+/// first call installs a panic hook that is silent for threads inside this function and calls the
+/// earlier hook for all others.
 pub(crate) fn guarded<T>(
     action: &'static str,
     work: impl FnOnce() -> TractResult<T>,
@@ -27,7 +27,7 @@ pub(crate) fn guarded<T>(
     HOOK.call_once(silence_guarded_panics);
     let backend = Backend::Tract;
     let outer = IS_GUARDED.replace(true);
-    // Whatever `work` was changing is dropped or rebuilt by the callers on failure.
+    // On failure the callers drop or rebuild whatever `work` was changing.
     let result = catch_unwind(AssertUnwindSafe(work));
     IS_GUARDED.set(outer);
     match result {
@@ -50,7 +50,7 @@ fn silence_guarded_panics() {
     }
     let loud = panic::take_hook();
     panic::set_hook(Box::new(move |panic| {
-        // Err: the thread is ending, and not in here.
+        // Fails if the thread is ending, and then it is not inside `guarded`.
         if !IS_GUARDED.try_with(Cell::get).unwrap_or(false) {
             loud(panic);
         }
@@ -62,7 +62,7 @@ fn panic_text(panic: &(dyn Any + Send)) -> &str {
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
 }
 
-/// The message of an assertion has three lines, a log has one for each event.
+/// Joins the lines of a message, since a log has one line for each event.
 fn in_one_line(text: &str) -> String {
     text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ")
 }

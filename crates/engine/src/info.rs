@@ -17,11 +17,12 @@ pub struct ModelInfo {
     pub onnx_sha256: String,
     /// Length of the file, bytes.
     pub bytes: u64,
-    /// Values in the network's tensors, scales included, masks left out.
+    /// Number of floating-point values in the network's tensors, without those that are maps, such
+    /// as masks.
     pub weights: u64,
     /// Hash of the atlas whose maps it takes and gives.
     pub atlas_hash: String,
-    /// Effects its training data have, such as `finite_strain`.
+    /// Effects of the physics in its training data, such as `finite_strain`.
     pub effects: Vec<String>,
     /// Kind and size of the network.
     pub network: Value,
@@ -29,12 +30,12 @@ pub struct ModelInfo {
     pub pressure_max_pa: f32,
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
-    /// SHA-256 of the dataset it was trained on; of several, that of their
-    /// [`datasets`](Self::datasets)' hashes one after another.
+    /// SHA-256 of the dataset it was trained on. If there were several, SHA-256 of the hashes of
+    /// its [`datasets`](Self::datasets) joined in order.
     pub dataset_sha256: String,
     /// How it was trained: seed, epochs, optimiser, loss, versions, seconds.
     pub training: Value,
-    /// What runs it, with version.
+    /// The backend that runs it, with its version.
     pub backend: String,
 }
 
@@ -79,15 +80,16 @@ impl ModelInfo {
         })
     }
 
-    /// SHA-256 of each dataset it was trained on: what `papilla.training` lists as `datasets`
-    /// if [`dataset_sha256`](Self::dataset_sha256) follows from that, else this one alone.
+    /// SHA-256 of each dataset it was trained on: the list `datasets` in `papilla.training`, if
+    /// [`dataset_sha256`](Self::dataset_sha256) is the hash of that list, otherwise
+    /// `dataset_sha256` alone.
     #[must_use]
     pub fn datasets(&self) -> Vec<&str> {
         datasets(&self.dataset_sha256, &self.training)
     }
 }
 
-/// What `training` lists as `datasets` if `own` follows from that, else `own` alone.
+/// The list `datasets` in `training` if `own` is the hash of that list, otherwise `own` alone.
 pub(crate) fn datasets<'a>(own: &'a str, training: &'a Value) -> Vec<&'a str> {
     let listed = training.get("datasets").and_then(Value::as_array);
     let parts: Vec<&str> = listed.into_iter().flatten().filter_map(Value::as_str).collect();
@@ -95,8 +97,8 @@ pub(crate) fn datasets<'a>(own: &'a str, training: &'a Value) -> Vec<&'a str> {
     if parts.len() > 1 && joined == own { parts } else { vec![own] }
 }
 
-/// Floating-point initialisers, also those stored in 16 bits, but for maps (masks,
-/// coordinates): the trained part.
+/// Number of values in floating-point initialisers, also those stored in 16 bits, without maps
+/// (masks, coordinates).
 fn weight_count(proto: &ModelProto) -> u64 {
     const SIDE: i64 = MAP_SIDE_PX as i64;
     let Some(graph) = &proto.graph else { return 0 };

@@ -67,7 +67,7 @@ pub trait Model: Send + Sync {
     /// What the model is: name, atlas, effects, scales, backend.
     fn info(&self) -> &ModelInfo;
 
-    /// What runs it.
+    /// The backend that runs it.
     fn backend(&self) -> Backend;
 
     /// Makes the pre-allocated state of one inference thread.
@@ -81,15 +81,15 @@ pub trait Model: Send + Sync {
 pub trait Session: Send {
     /// Infers one map.
     ///
-    /// `pressure_pa` and `sed_j_per_m3` hold 224 x 224 values, row-major. Beyond what the
-    /// backend itself does, nothing is allocated. After an error the session can be used
-    /// again; `sed_j_per_m3` then holds nothing of use.
+    /// `pressure_pa` and `sed_j_per_m3` hold 224 x 224 values, row-major. Nothing is allocated,
+    /// except by the backend itself. After an error the session can be used again, and the contents
+    /// of `sed_j_per_m3` are unspecified.
     ///
     /// # Errors
     /// - [`EngineError::WrongLength`]: a map of another length.
     /// - [`EngineError::NonFiniteInput`]: a pressure that is NaN or infinite.
-    /// - [`EngineError::NonFiniteOutput`], [`EngineError::NegativeOutput`]: the network
-    ///   answered with what is no energy density; the map is not to be used.
+    /// - [`EngineError::NonFiniteOutput`], [`EngineError::NegativeOutput`]: the network answered a
+    ///   value that cannot be an energy density; the map must not be used.
     /// - [`EngineError::Backend`], [`EngineError::Panicked`]: the backend failed.
     fn infer(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> Result<(), EngineError>;
 }
@@ -105,8 +105,8 @@ pub fn load(onnx: &[u8], card: Option<&Card>) -> Result<Arc<dyn Model>, EngineEr
 /// Loads a model: checks the file against the contract and against its card, if there is
 /// one, optimises it and infers one trial map.
 ///
-/// Without a card a changed bit inside a weight cannot be noticed (the file has no
-/// checksum of its own); with one, the SHA-256 settles it.
+/// Without a card a changed bit inside a weight cannot be noticed, since the file has no checksum
+/// of its own. With a card its SHA-256 is compared.
 ///
 /// # Errors
 /// An [`EngineError`] that says which rule of the contract the file breaks. Whatever the
@@ -146,9 +146,10 @@ fn tried(model: &dyn Model) -> Result<(), EngineError> {
     model.session()?.infer(&pressure_pa, &mut vec![0.0; MAP_LEN])
 }
 
-/// Does work on a thread of its own, whose memory is the system's again when it ends. To read and
-/// optimise a network takes many times the memory that is kept of it; on the thread that keeps the
-/// network, what is kept would hold on to pages that are free but for it.
+/// Does work on a thread of its own, whose memory goes back to the system when it ends. Reading and
+/// optimising a network takes many times the memory that is kept. If the thread that keeps the
+/// network did it, the few allocations that stay would keep otherwise free pages from being
+/// returned.
 fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, EngineError> {
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new().name("load".to_owned());
@@ -161,8 +162,8 @@ fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, EngineError> {
     })
 }
 
-/// The graph as it stands in the file, run by tract operator after operator: what benchmarks compare
-/// a faster evaluation with.
+/// Loads the graph as it stands in the file, run by tract one operator after another. Benchmarks
+/// and tests compare faster evaluations with it.
 ///
 /// # Errors
 /// As [`load_with`].
@@ -171,8 +172,8 @@ pub fn load_as_it_stands(onnx: &[u8]) -> Result<Arc<dyn Model>, EngineError> {
     Ok(Arc::new(tract_backend::TractModel::load(&proto, info)?))
 }
 
-/// A file that has passed the checks of the contract and is its card's, with constants stored in 16
-/// bits widened, and what it says of itself.
+/// Decodes a file and checks it against the contract and its card. Constants stored in 16 bits are
+/// widened in the result.
 fn checked(onnx: &[u8], card: Option<&Card>) -> Result<(ModelProto, ModelInfo), EngineError> {
     let mut proto = onnx::decode(onnx)?;
     let info = ModelInfo::read(&proto, onnx)?;
@@ -184,7 +185,7 @@ fn checked(onnx: &[u8], card: Option<&Card>) -> Result<(ModelProto, ModelInfo), 
     Ok((proto, info))
 }
 
-/// One smooth contact, half as hard as the model was trained for, Pa.
+/// The map of one smooth contact, whose peak is half of the greatest pressure of the training, Pa.
 fn trial_map(pressure_max_pa: f32) -> Vec<f32> {
     let centre = MAP_SIDE_PX as f32 / 2.0;
     (0..MAP_LEN)
@@ -203,7 +204,8 @@ fn check_maps(pressure_pa: &[f32], sed_j_per_m3: &[f32]) -> Result<(), EngineErr
             return Err(EngineError::WrongLength { map, found, expected: MAP_LEN });
         }
     }
-    // A ReLU turns NaN into zero: the answer would not betray it.
+    // This has to be checked here, since a ReLU may turn NaN into zero, and the answer would not
+    // show it.
     if all(pressure_pa, f32::is_finite) {
         return Ok(());
     }
@@ -216,17 +218,17 @@ fn check_maps(pressure_pa: &[f32], sed_j_per_m3: &[f32]) -> Result<(), EngineErr
     }
 }
 
-/// Whether all values are good. Sixteen at a time and without a branch between them: the compiler
-/// makes vectors of that, which it cannot of a search.
+/// Whether all values are good. It checks sixteen values at a time without a branch between them,
+/// which the compiler can vectorise; a search that stops early it cannot.
 fn all(values: &[f32], good: impl Fn(f32) -> bool) -> bool {
     let (chunks, rest) = values.as_chunks::<16>();
     let whole = |values: &[f32]| values.iter().fold(true, |all, &value| all & good(value));
     chunks.iter().all(|chunk| whole(chunk)) && whole(rest)
 }
 
-/// Refuses what is no energy density.
+/// Refuses an answer with a value that is NaN, infinite or negative.
 fn check_output(sed_j_per_m3: &[f32]) -> Result<(), EngineError> {
-    // One comparison a pixel: NaN fails both, and the good case is the fast one.
+    // A range check, since NaN fails it too.
     let good = |v: f32| (0.0..=f32::MAX).contains(&v);
     if all(sed_j_per_m3, good) {
         return Ok(());

@@ -4,23 +4,24 @@ use pulp::{Arch, Simd, WithSimd};
 use std::sync::Arc;
 use tract_onnx::tract_core::internal::*;
 
-/// Channels whose sums are in registers at a time.
+/// Output channels whose sums are kept in registers at a time.
 const CHANNELS: usize = 4;
-/// Vectors of pixels of each: with four channels eight sums, as many as two units of a latency of
-/// four cycles need to be busy.
+/// Vectors of pixels for each of these channels. With four channels that makes eight independent
+/// sums, as many as two arithmetic units with a latency of four cycles need to be kept busy.
 const VECTORS: usize = 2;
 
 /// `y[o, r, c] = b[o] + sum over i, s, t of w[o, i, s, t] x[i, r + s - p, c + t - q]`, x = 0 outside.
 #[derive(Clone, Debug)]
 pub(super) struct Direct {
     shape: Shape,
-    /// `w[o / 4, i, s, t, o % 4]`, 0 beyond the last channel.
+    /// `w[o / 4, i, s, t, o % 4]`, with zeros beyond the last channel.
     weights: Arc<Vec<f32>>,
-    /// A value for each channel, 0 beyond the last.
+    /// One value for each channel, with zeros beyond the last.
     bias: Arc<Vec<f32>>,
 }
 
-/// Lengths, in the order channels, rows, columns.
+/// Sizes of the input `map`, the kernel and the output `made`, in the order channels, rows,
+/// columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Shape {
     pub map: [usize; 3],
@@ -31,19 +32,19 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// Rows and columns that are read: of the map and the zeros around it.
+    /// Rows and columns that are read, with the zeros around the map.
     fn read(&self) -> [usize; 2] {
         [0, 1].map(|axis| self.made[axis + 1] + self.kernel[axis] - 1)
     }
 
-    /// Weights between all channels that a map has and one block of those that are made.
+    /// Number of weights between all input channels and one block of output channels.
     fn block_len(&self) -> usize {
         self.map[0] * self.kernel[0] * self.kernel[1] * CHANNELS
     }
 }
 
 impl Direct {
-    /// `kernels` is `[O, I, S, T]`; `bias` has one value, or one for each channel.
+    /// `kernels` is `[O, I, S, T]`; `bias` has one value for all channels, or one for each.
     pub(super) fn new(shape: Shape, kernels: &Tensor, bias: &Tensor) -> TractResult<Self> {
         let (made, taps) = (shape.made[0], shape.block_len() / CHANNELS);
         let kernels = kernels.try_as_plain_ram()?;
@@ -67,7 +68,7 @@ impl Direct {
         Ok(Self { shape, weights: Arc::new(weights), bias: Arc::new(biases) })
     }
 
-    /// Bytes of the weights, and products of a map.
+    /// Bytes of the weights, and number of products that one map takes.
     pub(super) fn size(&self) -> (u64, u64) {
         let Shape { map, kernel, made, .. } = self.shape;
         let weights = made[0] * map[0] * kernel[0] * kernel[1];
@@ -81,7 +82,7 @@ impl Direct {
         let mut wide = Tensor::zero::<f32>(&[channels, read_rows, read_columns])?;
         let mut plain = wide.try_as_plain_ram_mut()?;
         let values = plain.as_slice_mut::<f32>()?;
-        // A kernel that looks at less than the whole map leaves its end out.
+        // If the kernel does not reach the end of the map, that end is left out.
         let (kept, width) =
             (rows.min(read_rows - before[0]), columns.min(read_columns - before[1]));
         for (channel, of_channel) in
@@ -98,7 +99,7 @@ impl Direct {
 
 struct Work<'a> {
     shape: Shape,
-    /// `[I, rows, columns]` as they are read.
+    /// `[I, rows, columns]`, with the zeros around.
     map: &'a [f32],
     weights: &'a [f32],
     bias: &'a [f32],
@@ -126,8 +127,8 @@ impl WithSimd for Work<'_> {
 }
 
 impl Work<'_> {
-    /// A row of a block of channels, V vectors of pixels at a time. The last ones overlap those
-    /// before where the row is no multiple of them.
+    /// Computes a row of a block of channels, V vectors of pixels at a time. If the row is no
+    /// multiple of V vectors, the last ones overlap those before them.
     #[inline(always)]
     fn row<S: Simd, const V: usize>(&mut self, simd: S, block: usize, row: usize) {
         let columns = self.shape.made[2];
@@ -179,7 +180,7 @@ impl Work<'_> {
         sums
     }
 
-    /// A row of fewer pixels than a vector has.
+    /// Computes a row that has fewer pixels than a vector.
     fn narrow_row(&mut self, block: usize, row: usize) {
         let Shape { map: [channels, ..], kernel, made, .. } = self.shape;
         let [read_rows, read_columns] = self.shape.read();
@@ -202,7 +203,7 @@ impl Work<'_> {
         }
     }
 
-    /// Where the row of a channel begins, if there is such a channel.
+    /// Where the row of a channel begins; None if there is no such channel.
     fn place(&self, block: usize, channel: usize, row: usize) -> Option<usize> {
         let [made, rows, columns] = self.shape.made;
         let channel = block * CHANNELS + channel;

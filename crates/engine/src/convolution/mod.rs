@@ -15,12 +15,12 @@ use tract_onnx::tract_core::internal::*;
 use tract_onnx::tract_core::ops::cnn::{Conv, KernelFormat};
 use tract_onnx::tract_core::ops::nn::DataFormat;
 
-/// Most weights of a convolution that is run as it stands (1 MiB): they are read again for every row
-/// and have to stay in the cache.
+/// The most weights of a convolution that is run this way (1 MiB). They are read again for every
+/// row and must stay in the cache.
 const WEIGHTS_MAX: usize = 1 << 18;
 
-/// Replaces convolutions of one map by constant kernels. Those of one pixel are products once the
-/// graph is decluttered.
+/// Replaces every convolution of one map with constant kernels. Kernels of one pixel are no
+/// convolutions any more once tract has decluttered the graph, but products.
 pub(crate) fn run_direct(mut model: TypedModel) -> TractResult<TypedModel> {
     for node in model.eval_order()? {
         if let Some(convolution) = direct(&model, node)? {
@@ -32,12 +32,13 @@ pub(crate) fn run_direct(mut model: TypedModel) -> TractResult<TypedModel> {
     Ok(model)
 }
 
-/// Bytes of the weights and products of a map of a node that is such a convolution.
+/// If a node is such a convolution: bytes of its weights, and number of products that one map
+/// takes.
 pub(crate) fn table(node: &TypedNode) -> Option<(u64, u64)> {
     node.op_as::<Direct>().map(Direct::size)
 }
 
-/// The convolution at a node, if it is one of step 1, between constant kernels and one map.
+/// The convolution at a node, if it has stride 1, constant kernels and one map.
 fn direct(model: &TypedModel, node: usize) -> TractResult<Option<Direct>> {
     let node = &model.nodes[node];
     let Some(op) = node.op_as::<Conv>() else { return Ok(None) };

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// Name of the set of states on the finest mesh.
 pub const REFERENCE_SET: &str = "reference";
 
-/// Names of the held-out sets, in the order in which errors are looked up for a choice.
+/// Names of the held-out sets. Tiers are compared on the first of them on which all were measured.
 pub const SET_NAMES: [&str; 6] =
     ["heldout-presses", "heldout-shapes", REFERENCE_SET, "reference-anew", "pressed", "s1"];
 
@@ -25,21 +25,23 @@ pub struct Ladder {
     pub atlas_hash: String,
     /// Processor and system that the times were taken on.
     pub machine: String,
-    /// Whether only a part of each set was measured.
+    /// Whether only part of each set was measured, to save time.
     #[serde(default)]
     pub quick: bool,
     /// The sets, measured or not.
     pub sets: Vec<Set>,
-    /// The set whose median relative L2 decides [`Rung::pareto`]; absent if none was measured.
+    /// The set whose median relative L2 decides [`Rung::pareto`]; absent if no set was measured.
     #[serde(default)]
     pub pareto_set: Option<String>,
-    /// Relative L2 by which the reference itself may be off; absent without a reference.
+    /// Estimated error of the reference itself; absent without a reference.
     #[serde(default)]
     pub discretisation_error: Option<Discretisation>,
-    /// What the reference's pressure maps are worth; absent without the same states on another mesh.
+    /// How much the reference's pressure maps depend on the mesh; absent without the same states on
+    /// another mesh.
     #[serde(default)]
     pub readings: Option<Readings>,
-    /// What traction along the skin is worth; empty without datasets of presses with friction.
+    /// How much traction along the skin improves SED; empty without datasets of simulations with
+    /// friction.
     #[serde(default)]
     pub traction: Vec<Traction>,
     /// The rungs.
@@ -53,7 +55,7 @@ pub struct Set {
     pub name: String,
     /// Samples measured; 0 if the set was not there.
     pub samples: usize,
-    /// What it holds, or why it was not measured.
+    /// What the set holds, or why it was not measured.
     #[serde(default)]
     pub about: String,
     /// SHA-256 of the dataset; absent for the reference, and if the set was not there.
@@ -61,7 +63,7 @@ pub struct Set {
     pub dataset_sha256: Option<String>,
 }
 
-/// How far the reference itself may be off.
+/// Estimated error of the reference itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Discretisation {
     /// Relative L2 of SED.
@@ -70,45 +72,46 @@ pub struct Discretisation {
     pub how: String,
 }
 
-/// One state's pressure, read on the reference and on another mesh, relative L2.
+/// Differences between the same states on the reference's mesh and on another mesh, relative L2.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Readings {
     /// The other mesh.
     pub mesh: String,
-    /// States on both.
+    /// Number of states solved on both meshes.
     pub states: usize,
-    /// Between the two maps of pressure.
+    /// Difference between the two pressure maps.
     pub pressure: Spread,
-    /// The same of maps under a Gaussian of .1 mm.
+    /// The same after both maps are smoothed by a Gaussian of 0.1 mm.
     pub averaged: Spread,
-    /// Between a model's answers to the two, by its name.
+    /// Difference between a model's answers to the two pressure maps, by the model's name.
     pub answers: BTreeMap<String, Spread>,
 }
 
-/// What the effect `shear_energy` makes of traction, on states with friction that no network learnt.
+/// The gain by the effect `shear_energy`, measured on states with friction that no network was
+/// trained on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Traction {
     /// Name of the network.
     pub model: String,
-    /// Campaign.
+    /// Name of the campaign.
     pub set: String,
-    /// States.
+    /// Number of states.
     pub samples: usize,
-    /// Relative L2 of SED that the network makes of pressure alone.
+    /// Relative L2 of the network's SED from pressure alone.
     pub alone: Spread,
-    /// The same with what traction adds.
+    /// The same with the SED that traction adds.
     pub felt: Spread,
     /// Processor time that traction adds to a frame, ms.
     pub added_ms: Spread,
 }
 
-/// What a rung is.
+/// The kind of a rung.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// A half-space in place of the finger.
     ClosedForm,
-    /// This finger's operator at small strain.
+    /// The linear operator of this finger at small strain.
     Operator,
     /// A trained network.
     Network,
@@ -117,7 +120,7 @@ pub enum Kind {
     PublishedUNet,
     /// The finite-element solver itself.
     Fe,
-    /// One map for every pressure: what whoever knows nothing of the pressure errs.
+    /// The same map for every pressure: the error of knowing nothing about the pressure.
     Floor,
 }
 
@@ -133,7 +136,7 @@ impl Kind {
         }
     }
 
-    /// Whether it was trained, ours or the published one.
+    /// Whether it is a trained network: one of this project or the published one.
     #[must_use]
     pub const fn is_network(self) -> bool {
         matches!(self, Self::Network | Self::PublishedUNet)
@@ -145,9 +148,9 @@ impl Kind {
 pub struct Rung {
     /// Its name.
     pub name: String,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
-    /// Name of the model that serves it; none for FE and floors.
+    /// Name of the model that serves it; None for FE and floors.
     pub model: Option<String>,
     /// SHA-256 of the model measured.
     #[serde(default)]
@@ -156,7 +159,7 @@ pub struct Rung {
     pub bytes: Option<u64>,
     /// Time from the file's bytes to the first answer, ms.
     pub load_ms: Option<f64>,
-    /// Growth of resident memory while it was loaded and answered one map, at its peak, MiB.
+    /// Peak growth of resident memory while it was loaded and answered one map, MiB.
     pub memory_mib: Option<f64>,
     /// Time of one inference on one thread, by engine.
     pub latency_ms: Option<LatencyByEngine>,
@@ -168,13 +171,13 @@ pub struct Rung {
     pub reference: bool,
     /// Errors by the name of the set.
     pub errors: BTreeMap<String, SetErrors>,
-    /// Answers that were no energy density (NaN, infinite, negative) and were refused.
+    /// Number of answers that were refused, since a value was NaN, infinite or negative.
     #[serde(default)]
     pub refused: usize,
-    /// Greatest answer to a map of zeros over the greatest SED of its training data.
+    /// Greatest answer to a map of zeros, relative to the greatest SED of its training data.
     #[serde(default)]
     pub zero_answer: Option<f64>,
-    /// Whether it is worth its time on [`Ladder::pareto_set`]: [`Ladder::mark_front`].
+    /// Whether it lies on the Pareto front of [`Ladder::pareto_set`]; see [`Ladder::mark_front`].
     pub pareto: bool,
 }
 
@@ -207,7 +210,7 @@ impl Rung {
         tract.or(self.seconds.map(|seconds| 1e3 * seconds.p50))
     }
 
-    /// The same in the engine that is named, if it was measured there.
+    /// The same in this backend if it was measured there, otherwise as [`time_ms`](Self::time_ms).
     #[must_use]
     pub fn time_ms_in(&self, backend: Backend) -> Option<f64> {
         let ort = self.latency_ms.as_ref().and_then(|latency| latency.ort);
@@ -227,7 +230,7 @@ impl Rung {
 pub struct LatencyByEngine {
     /// In tract.
     pub tract: Percentiles,
-    /// In ONNX Runtime; absent if it was not at hand.
+    /// In ONNX Runtime; absent if it was not available.
     pub ort: Option<Percentiles>,
 }
 
@@ -240,7 +243,7 @@ pub struct Percentiles {
     pub p99: f64,
 }
 
-/// Errors on one set; as in a card, with those that only the ladder measures.
+/// Errors on one set, as in a card.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetErrors {
     /// Samples measured.
@@ -307,9 +310,8 @@ impl Ladder {
         self.rungs.iter().find(|rung| rung.model.as_deref() == Some(model))
     }
 
-    /// Marks the Pareto front over [`Rung::time_ms`] and the median relative L2 on `pareto_set`: what
-    /// nothing faster comes close to, as far as that set can [tell](Self::told_apart). The reference
-    /// has no error there.
+    /// Marks the rungs on the [front](Self::front) of `pareto_set`. Does nothing without such a
+    /// set.
     pub fn mark_front(&mut self) {
         let Some(set) = self.pareto_set.clone() else { return };
         let on_front = self.front(&set);
@@ -318,8 +320,9 @@ impl Ladder {
         }
     }
 
-    /// Which rungs are worth their time on a set: their error lies by more than the set can
-    /// [tell](Self::told_apart) below that of every faster one that is, too.
+    /// Which rungs lie on the Pareto front of time ([`Rung::time_ms`]) and median relative L2 on a
+    /// set. A rung does if its error is smaller than that of every faster rung on the front, by
+    /// more than the set can [tell](Self::told_apart). Rungs without a time or an error do not.
     #[must_use]
     pub fn front(&self, set: &str) -> Vec<bool> {
         let place = |(i, rung): (usize, &Rung)| Some((i, rung.time_ms()?, rung.relative_l2(set)?));
@@ -335,7 +338,8 @@ impl Ladder {
         on_front
     }
 
-    /// The difference of two errors below which a set says nothing: the reference's own error.
+    /// Differences between two errors below this are not significant on the set: the error of the
+    /// reference itself, or 0 on other sets.
     #[must_use]
     pub fn told_apart(&self, set: &str) -> f64 {
         let own = self.discretisation_error.as_ref().filter(|_| set == REFERENCE_SET);
