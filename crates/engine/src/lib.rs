@@ -163,7 +163,7 @@ fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, EngineError> {
 }
 
 /// Loads the graph as it stands in the file, run by tract one operator after another. Benchmarks
-/// and tests compare faster evaluations with it.
+/// compare faster evaluations with it.
 ///
 /// # Errors
 /// As [`load_with`].

@@ -9,7 +9,7 @@ use tract_onnx::pb::{
 };
 use tract_onnx::prelude::Framework;
 
-/// Subgraphs inside subgraphs; plain networks have none.
+/// Greatest depth of nested subgraphs; plain networks have none.
 const DEPTH_MAX: usize = 8;
 
 /// Decodes an ONNX file.
@@ -136,7 +136,7 @@ fn check_attribute(
 
 fn check_tensor(tensor: &TensorProto, name: &str) -> Result<(), EngineError> {
     let broken = |reason: String| EngineError::BrokenTensor { tensor: name.to_owned(), reason };
-    // A model must not make the program read other files.
+    // A model file must not make the program read other files.
     if !tensor.external_data.is_empty()
         || tensor.data_location == Some(DataLocation::External as i32)
     {

@@ -9,7 +9,7 @@ use crate::{EngineError, MAP_SIDE_PX, tract_backend::TENSOR_LEN_MAX};
 use std::collections::{HashMap, HashSet};
 use tract_onnx::pb::{AttributeProto, GraphProto, NodeProto};
 
-/// Of a value each, with broadcasting.
+/// Their output has the shape to which their inputs are broadcast.
 const ELEMENTWISE: [&str; 36] = [
     "Abs",
     "Add",
@@ -49,10 +49,10 @@ const ELEMENTWISE: [&str; 36] = [
     "Where",
 ];
 
-/// Products of their inputs at most.
+/// Their output is at most as long as the product of their inputs' lengths.
 const PRODUCTS: [&str; 4] = ["Einsum", "Gather", "Gemm", "MatMul"];
 
-/// As long as their first input at most.
+/// Their output is at most as long as their first input.
 const REARRANGING: [&str; 17] = [
     "ArgMax",
     "ArgMin",
@@ -73,8 +73,8 @@ const REARRANGING: [&str; 17] = [
     "Unsqueeze",
 ];
 
-/// Only of what depends on the map: their output follows from its shape, which is checked once
-/// tract has worked all shapes out.
+/// They are accepted only if an input depends on the map. Their output's shape follows from that
+/// input's, and is checked once tract has worked out all shapes.
 const OF_THE_MAP: [&str; 15] = [
     "AveragePool",
     "BatchNormalization",
@@ -102,10 +102,10 @@ const WINDOWS: [&str; 6] =
 /// # Errors
 /// [`EngineError::Operator`], [`EngineError::TooLarge`].
 pub(crate) fn check(graph: &GraphProto) -> Result<(), EngineError> {
-    // Greatest lengths of what depends on the file alone.
+    // Greatest lengths of the tensors that depend on the file alone.
     let mut constants: HashMap<&str, u64> =
         graph.initializer.iter().map(|t| (t.name.as_str(), length(&t.dims))).collect();
-    // What depends on the map.
+    // Names of the tensors that depend on the map.
     let mut variables: HashSet<&str> = graph.input.iter().map(|i| i.name.as_str()).collect();
     for node in &graph.node {
         let refuse = |reason: &str| {
@@ -151,7 +151,8 @@ fn length(dims: &[i64]) -> u64 {
     dims.iter().fold(1, |n: u64, &dim| n.saturating_mul(dim.max(0).unsigned_abs()))
 }
 
-/// A kernel as large as the map is a sum over it; nothing needs more.
+/// Whether an attribute lets a window reach further than any model needs: a kernel as large as the
+/// map is a sum over all of it.
 fn reaches_too_far(attribute: &AttributeProto) -> bool {
     const SIDE: u64 = MAP_SIDE_PX as u64;
     let limit = if attribute.name == "kernel_shape" { SIDE } else { 2 * SIDE };
@@ -159,8 +160,8 @@ fn reaches_too_far(attribute: &AttributeProto) -> bool {
         && attribute.ints.iter().any(|int| int.unsigned_abs() > limit)
 }
 
-/// Most values of what `node` makes if that depends on constants alone; None if it depends on the
-/// map, so that its shape is known before it is computed.
+/// The most values in the output of `node`, if that depends on constants alone. None: it depends on
+/// the map, and then its shape is known before it is computed.
 fn made_of_constants(
     node: &NodeProto,
     constants: &HashMap<&str, u64>,

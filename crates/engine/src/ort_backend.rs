@@ -14,7 +14,8 @@ use ort::value::Tensor;
 use std::fmt::Display;
 use std::sync::{Arc, OnceLock};
 
-/// Names the library when `ORT_DYLIB_PATH` does not; the loader then searches for it.
+/// File name of the library if `ORT_DYLIB_PATH` does not name one. The system's loader searches for
+/// it.
 const LIBRARY: &str = if cfg!(target_os = "windows") {
     "onnxruntime.dll"
 } else if cfg!(target_os = "macos") {
@@ -38,7 +39,7 @@ impl OrtModel {
     }
 }
 
-/// The one environment a process may have; the first call opens the library.
+/// The one environment that a process may have. The first call opens the library.
 pub(crate) fn environment() -> Result<Environment, EngineError> {
     static ENVIRONMENT: OnceLock<Result<Environment, String>> = OnceLock::new();
     let made = ENVIRONMENT.get_or_init(|| {
@@ -50,13 +51,13 @@ pub(crate) fn environment() -> Result<Environment, EngineError> {
                  (`pip install onnxruntime` brings onnxruntime/capi/libonnxruntime.so.*)"
             )
         })?;
-        // Nobody is told what is rendered here.
+        // ONNX Runtime must not report to anybody what is rendered here.
         builder.with_telemetry(false).build().map_err(|error| error.to_string())
     });
     made.clone().map_err(|reason| EngineError::BackendMissing { backend: Backend::Ort, reason })
 }
 
-/// Which library was opened: the branch or else the commit of its build information
+/// The version of the library: the release branch or else the commit in its build information
 /// (`ORT Build Info: git-branch=rel-1.19.0, git-commit-id=26250ae, ...`; wheels print
 /// `git-branch=HEAD`).
 fn version() -> String {
@@ -106,9 +107,9 @@ impl Model for OrtModel {
 
 struct OrtSession {
     run: OrtRun,
-    /// Filled anew for each map.
+    /// The input tensor, which is filled anew for each map.
     input: Tensor<f32>,
-    /// Holds the tensor of every answer, so that none is made for a map.
+    /// Holds the output tensor, which is reused so that no map allocates one.
     options: RunOptions<HasSelectedOutputs>,
 }
 
@@ -117,7 +118,7 @@ impl Session for OrtSession {
         check_maps(pressure_pa, sed_j_per_m3)?;
         let action = "infer a map";
         self.input.extract_tensor_mut().1.copy_from_slice(pressure_pa);
-        // By place, which allocates nothing; the contract has one input.
+        // Inputs are given by position, which allocates nothing; the contract has one input.
         let inputs = ort::inputs![&self.input];
         let outputs = self.run.run_with_options(inputs, &self.options).map_err(failed(action))?;
         let (_, answer) =

@@ -14,19 +14,19 @@ use tract_onnx::tract_core::plan;
 pub struct Operator {
     /// Name of its node.
     pub name: String,
-    /// What it is, in tract's words.
+    /// Name of the operator in tract.
     pub kind: String,
-    /// Bytes of its constants: weights, and tables of what is picked from where.
+    /// Bytes of its constants: weights, and tables of indices.
     pub constant_bytes: u64,
-    /// Bytes of what it takes and makes for each map.
+    /// Bytes of its inputs and outputs for one map.
     pub map_bytes: u64,
-    /// Additions and multiplications of products and sums.
+    /// Number of additions, multiplications and divisions for one map.
     pub operations: u64,
     /// Time of one map: the median of all runs.
     pub median: Duration,
 }
 
-/// Runs a model so many times on one contact and times every operator.
+/// Runs a model `runs` times on one contact, and times every operator.
 ///
 /// # Errors
 /// As [`load_with`](crate::load_with).
@@ -63,7 +63,7 @@ pub fn profile(onnx: &[u8], runs: usize) -> Result<Vec<Operator>, EngineError> {
 }
 
 impl Operator {
-    /// Constants and the input: nothing is done for a map.
+    /// Whether it is a constant or the input, for which nothing is computed.
     fn is_free(&self) -> bool {
         ["Const", "Source"].contains(&self.kind.as_str())
     }
@@ -98,7 +98,7 @@ fn operator(model: &TypedModel, node: &TypedNode, median: Duration) -> TractResu
     Ok(Operator { name, kind, constant_bytes, map_bytes, operations, median })
 }
 
-/// Bytes of the matrices that tract keeps within a product.
+/// Bytes of the constant matrices that tract keeps inside a product.
 fn packed_bytes(node: &TypedNode) -> TractResult<u64> {
     let Some(product) = node.op_as::<OptMatMul>() else { return Ok(0) };
     let mut bytes = 0;

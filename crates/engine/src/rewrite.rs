@@ -2,8 +2,8 @@
 
 use tract_onnx::tract_core::internal::*;
 
-/// Puts `op` in the place of all that lies between `source` and the output of the node `end`, under
-/// that node's name and `.suffix`.
+/// Replaces everything between `source` and the output of the node `end` by `op`, whose name is
+/// that node's with `.suffix`.
 pub(crate) fn replace(
     model: &mut TypedModel,
     source: OutletId,

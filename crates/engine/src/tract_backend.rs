@@ -9,11 +9,11 @@ use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
 use tract_onnx::tract_core::model::TypedSimpleState;
 
-/// Backend and version, for cards and logs; a test holds it to `Cargo.lock`.
+/// Backend and version, for cards and logs. A test compares it with `Cargo.lock`.
 pub(crate) const LABEL: &str = "tract 0.23.9";
 
-/// Most values in all tensors together (1 GiB of f32): a garbled shape is refused
-/// before it asks the system for more memory than there is, which would abort.
+/// The most values in all tensors together (1 GiB of f32). A garbled shape is refused before it is
+/// allocated, since an allocation beyond the memory there is would abort the process.
 pub(crate) const TENSOR_LEN_MAX: i64 = 1 << 28;
 
 pub(crate) struct TractModel {
@@ -31,7 +31,7 @@ impl TractModel {
         })?;
         check_sizes(&typed)?;
         let plan = guarded("optimise the model", || {
-            // Again: only now is a bias that was given a shape known to be constant.
+            // Done a second time, since a bias that was reshaped is known to be constant only now.
             let direct = convolution::run_direct(typed.into_decluttered()?)?;
             let fused = sparse::fuse(direct)?;
             let stacked = products::stack(fused)?;
@@ -45,7 +45,7 @@ impl TractModel {
     }
 }
 
-/// What every map is, in tract and ONNX.
+/// The shape of every map in tract and ONNX.
 pub(crate) const SHAPE: [usize; 4] = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
 
 fn check_sizes(model: &TypedModel) -> Result<(), EngineError> {
@@ -88,7 +88,8 @@ impl Model for TractModel {
 struct TractSession {
     plan: Arc<TypedRunnableModel>,
     state: TypedSimpleState,
-    /// Filled anew for each map; tract lets go of it when a run ends.
+    /// The input tensor, which is filled anew for each map. tract drops its reference when a run
+    /// ends.
     input: Arc<Tensor>,
 }
 
@@ -112,7 +113,7 @@ impl Session for TractSession {
     fn infer(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> Result<(), EngineError> {
         check_maps(pressure_pa, sed_j_per_m3)?;
         if let Err(error) = guarded("infer a map", || self.run(pressure_pa, sed_j_per_m3)) {
-            // What an interrupted run leaves behind is not known: start afresh.
+            // The state after an interrupted run is unknown, so it is made anew.
             self.state = guarded("set up a session", || self.plan.spawn())?;
             return Err(error);
         }

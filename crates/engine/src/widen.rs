@@ -8,8 +8,8 @@ use half::f16;
 use std::collections::HashMap;
 use tract_onnx::pb::{ModelProto, NodeProto, TensorProto, tensor_proto::DataType};
 
-/// Replaces casts of stored constants by the constants they give. The model must have
-/// passed [`crate::onnx`]'s checks; what is no such cast stays as it is.
+/// Replaces casts of stored constants by the constants that they give. The model must have passed
+/// the checks of [`crate::onnx`]. Other casts stay as they are.
 pub(crate) fn widen(model: &mut ModelProto) {
     let Some(graph) = &mut model.graph else { return };
     let place: HashMap<String, usize> =
@@ -28,7 +28,7 @@ pub(crate) fn widen(model: &mut ModelProto) {
     graph.initializer.extend(wide);
 }
 
-/// Input and target type of a cast.
+/// Input and target type of a node, if it is a cast.
 fn stored(node: &NodeProto) -> Option<(&str, i32)> {
     let to = node.attribute.iter().find(|a| a.name == "to")?;
     let is_cast = node.op_type == "Cast" && node.input.len() == 1;

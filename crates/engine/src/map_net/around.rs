@@ -16,23 +16,23 @@ use super::parts::CorrectionParts;
 use super::sums::{GROUP, MARGIN, Sums, VECTORS, in_vectors, settled, vectors, vectors_mut};
 use pulp::{Simd, WithSimd};
 
-/// Sums across a tile.
+/// Width and height of a tile of sums.
 const TILE: usize = 4;
-/// Places within a tile.
+/// Number of places within a tile.
 const PLACES: usize = TILE * TILE;
-/// Values across what a tile depends on.
+/// Width and height of the square of values that a tile depends on.
 const SPAN: usize = TILE + 2;
 const POINTS: usize = SPAN * SPAN;
-/// Most hidden channels at a time, so that their tiles stay in the nearest cache.
+/// The most hidden channels at a time, so that their tiles stay in the cache.
 const BATCH: usize = 2 * GROUP;
 
-/// The tile's polynomials are taken at 0, at both signs of these, and at infinity. The usual points 1
-/// and 2 lose a digit more: with 3/4 and 3/2, whose powers are exact, rounding is that of the sums as
-/// they stand or up to twice as much.
+/// The polynomials of Winograd's method are evaluated at 0, `A`, `-A`, `B`, `-B` and infinity. The
+/// usual points 1 and 2 lose one more digit. The powers of 3/4 and 3/2 are exact floats, and with
+/// them the rounding error is between one and two times that of the plain sums.
 const A: f32 = 0.75;
 const B: f32 = 1.5;
 
-/// What brings three weights of a row to six numbers.
+/// One row of the 6 x 3 matrix that transforms three weights into six numbers.
 fn weights(row: usize) -> [f64; 3] {
     let (a, b) = (f64::from(A), f64::from(B));
     let (of_a, of_b) = (2.0 * a * a * (a * a - b * b), 2.0 * b * b * (b * b - a * a));
@@ -47,7 +47,7 @@ fn weights(row: usize) -> [f64; 3] {
     }
 }
 
-/// Six values of a row to six numbers.
+/// Transforms six values of a row into six numbers.
 #[inline(always)]
 fn forward<S: Simd>(simd: S, values: [S::f32s; SPAN]) -> [S::f32s; SPAN] {
     let [first, second, third, fourth, fifth, sixth] = values;
@@ -71,7 +71,7 @@ fn forward<S: Simd>(simd: S, values: [S::f32s; SPAN]) -> [S::f32s; SPAN] {
     ]
 }
 
-/// Six products of a row to four sums.
+/// Transforms six products of a row into four sums.
 #[inline(always)]
 fn back<S: Simd>(simd: S, products: [S::f32s; SPAN]) -> [S::f32s; TILE] {
     let [zero, a, minus_a, b, minus_b, infinity] = products;
@@ -88,10 +88,10 @@ fn back<S: Simd>(simd: S, products: [S::f32s; SPAN]) -> [S::f32s; TILE] {
     ]
 }
 
-/// How the tiles of a map lie.
+/// How the tiles of a map lie in memory.
 #[derive(Clone, Copy, Debug)]
 struct Tiles {
-    /// Tiles across.
+    /// Number of tiles in a row.
     across: usize,
 }
 
@@ -100,7 +100,8 @@ impl Tiles {
         Self { across: side.div_ceil(TILE) }
     }
 
-    /// Positions between rows of tiles: one more, for what the last tile of a row reads.
+    /// Positions from one row of tiles to the next: one more than there are tiles, for what the
+    /// last tile of a row reads.
     fn stride(self) -> usize {
         self.across + 1
     }
@@ -109,17 +110,17 @@ impl Tiles {
         self.across * self.stride()
     }
 
-    /// Values of a plane that is made of whole vectors.
+    /// Length of a plane that is written, rounded up to whole vectors.
     fn plane_len(self) -> usize {
         self.positions().next_multiple_of(MARGIN)
     }
 
-    /// Values of a plane that is read, which has a row of tiles more.
+    /// Length of a plane that is read. It has one more row of tiles.
     fn read_len(self) -> usize {
         self.stride() * self.stride()
     }
 
-    /// Plane and position of a row and a column.
+    /// The plane of a pixel and its position in it.
     fn at(self, row: usize, column: usize) -> (usize, usize) {
         (row % TILE * TILE + column % TILE, row / TILE * self.stride() + column / TILE)
     }
@@ -129,17 +130,18 @@ impl Tiles {
 pub(super) struct Around {
     tiles: Tiles,
     inputs: usize,
-    /// `[hidden / 2, POINTS, inputs]`: two values and two gates.
+    /// Transformed weights `[hidden / 2, POINTS, inputs]`, each of two values and two gates.
     gated: Vec<[f32; GROUP]>,
     gain: Gain,
-    /// Of each batch of hidden channels.
+    /// The sums that each batch of hidden channels adds to the output.
     out: Vec<Sums>,
 }
 
-/// Where it is worked on.
+/// The working memory of a correction.
 #[derive(Debug)]
 pub(super) struct Space {
-    /// Components and pressures, `[inputs, PLACES, read]`: a row and a column of zeros before.
+    /// Components and pressures, `[inputs, PLACES, read_len]`, with a row and a column of zeros
+    /// before the map.
     map: Vec<f32>,
     /// `[POINTS, inputs, plane]`.
     points: Vec<f32>,
@@ -186,7 +188,7 @@ impl Around {
     pub(super) fn space(&self) -> Space {
         let plane_len = self.tiles.plane_len();
         Space {
-            // More for the vectors that reach over the end of the last plane.
+            // Longer, for vectors that reach beyond the end of the last plane.
             map: vec![0.0; self.inputs * PLACES * self.tiles.read_len() + 2 * MARGIN],
             points: vec![0.0; POINTS * self.inputs * plane_len],
             products: vec![0.0; POINTS * GROUP * VECTORS * MARGIN],
@@ -195,7 +197,7 @@ impl Around {
         }
     }
 
-    /// Keeps a row of a channel, to be read when all are there.
+    /// Stores a row of a channel. The correction is computed when all rows are stored.
     pub(super) fn keep(&self, row: usize, channel: usize, values: &[f32], space: &mut Space) {
         for first in 0..TILE {
             let place = self.kept_at(row, channel, first);
@@ -204,7 +206,7 @@ impl Around {
         }
     }
 
-    /// A row of a channel that was kept, with what the correction adds.
+    /// Writes a stored row of a channel plus what the correction adds to it.
     pub(super) fn sum_up(&self, row: usize, channel: usize, values: &mut [f32], space: &Space) {
         for first in 0..TILE {
             let kept = &space.map[self.kept_at(row, channel, first)..];
@@ -220,7 +222,7 @@ impl Around {
         (channel * PLACES + plane) * self.tiles.read_len() + at
     }
 
-    /// What is added to all rows that were kept.
+    /// Computes what the correction adds to all stored rows.
     #[inline(always)]
     pub(super) fn add<S: Simd>(&self, simd: S, space: &mut Space) {
         let around = self;
@@ -236,7 +238,7 @@ impl Around {
     }
 }
 
-/// Brings all values to their numbers.
+/// Transforms all values, tile by tile.
 struct Forward<'a> {
     around: &'a Around,
     space: &'a mut Space,
@@ -280,7 +282,8 @@ impl WithSimd for Forward<'_> {
     }
 }
 
-/// The products of a group of channels, and their hidden values but for the gain.
+/// Computes the products of a group of channels and from them its hidden values, still without the
+/// gain.
 struct Multiply<'a> {
     around: &'a Around,
     group: usize,
@@ -363,7 +366,7 @@ impl Multiply<'_> {
     }
 }
 
-/// What a batch of hidden channels adds.
+/// Adds what a batch of hidden channels contributes to the output.
 struct Out<'a> {
     around: &'a Around,
     batch: usize,

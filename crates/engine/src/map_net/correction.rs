@@ -9,17 +9,17 @@ use pulp::{Simd, WithSimd};
 
 /// Positions of which hidden values are kept at a time.
 const CHUNK: usize = VECTORS * MARGIN;
-/// `out (value * clamp(gate) * gain)`, where value and gate are convolutions of the components and
-/// pressures of a level.
+/// The correction `out (value * clamp(gate) * gain)`. Value and gate are convolutions of the
+/// components and pressures of a level.
 #[derive(Debug)]
 pub(super) enum Correction {
-    /// Over a block alone.
+    /// Kernels of one block.
     Alone(Alone),
-    /// Over 3 x 3 blocks.
+    /// Kernels of 3 x 3 blocks.
     Around(Around),
 }
 
-/// Where a correction is worked on.
+/// The working memory of a correction.
 #[derive(Debug)]
 pub(super) enum CorrectionSpace {
     Alone(Vec<f32>),
@@ -27,7 +27,7 @@ pub(super) enum CorrectionSpace {
 }
 
 impl Correction {
-    /// Of a kernel of one block or, as the graph is searched for, three.
+    /// The kernel is one block wide or, since the search in the graph accepts no others, three.
     pub(super) fn new(parts: &CorrectionParts, side: usize) -> Self {
         match parts.kernel {
             1 => Self::Alone(Alone::new(parts, side)),
@@ -47,7 +47,7 @@ impl Correction {
 #[derive(Debug)]
 pub(super) struct Alone {
     side: usize,
-    /// Two values, two gates, two values and so on.
+    /// The sums of values and gates: two values, two gates, two values and so on.
     gated: Sums,
     gain: Gain,
     out: Sums,

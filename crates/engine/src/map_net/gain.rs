@@ -3,7 +3,7 @@
 use super::sums::{GROUP, MARGIN, Sums};
 use pulp::Simd;
 
-/// `1 + sum over k of w[c, k] place[k]`, of each channel at each position.
+/// The factor `1 + sum over k of w[c, k] place[k]` of each channel c at each position.
 #[derive(Debug)]
 pub(super) struct Gain {
     sums: Sums,
@@ -19,8 +19,8 @@ impl Gain {
         Self::of_parts(weights, place, side, (side, side + MARGIN), at)
     }
 
-    /// As [`Self::of_rows`], where so many parts have so many positions each. `at`: the part and
-    /// the position of a row and a column.
+    /// As [`Self::of_rows`], for any division into `parts` of `positions` each. `at` gives the part
+    /// and the position for a row and a column.
     pub(super) fn of_parts(
         weights: &[f32],
         place: &[f32],
@@ -47,7 +47,8 @@ impl Gain {
         self.sums.groups()
     }
 
-    /// The factors of a group of channels at V vectors of positions; 1 beyond the last channel.
+    /// The factors of a group of channels at V vectors of positions; 1 for channels beyond the
+    /// last.
     #[inline(always)]
     pub(super) fn of_group<S: Simd, const V: usize>(
         &self,

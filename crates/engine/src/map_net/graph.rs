@@ -5,7 +5,7 @@ use tract_onnx::pb::{
     AttributeProto, GraphProto, ModelProto, NodeProto, TensorProto, tensor_proto::DataType,
 };
 
-/// Nodes and constants of a graph by the name of what they give.
+/// Nodes and constants of a graph, by the name of their output.
 pub(super) struct Graph<'a> {
     nodes: HashMap<&'a str, &'a NodeProto>,
     constants: HashMap<&'a str, &'a TensorProto>,
@@ -40,14 +40,14 @@ impl<'a> Graph<'a> {
         Some(Self { nodes, constants, output: &output.name })
     }
 
-    /// The node that gives this, if it is such an operator of the standard set.
+    /// The node whose output is `name`, if it is this operator of ONNX's own set.
     pub(super) fn node(&self, name: &str, operator: &str) -> Option<&'a NodeProto> {
         let node = self.nodes.get(name)?;
         let is_standard = node.domain.is_empty() || node.domain == "ai.onnx";
         (is_standard && node.op_type == operator).then_some(node)
     }
 
-    /// What such an operator takes, if it takes so much.
+    /// The inputs of that node, if there are N.
     pub(super) fn inputs<const N: usize>(
         &self,
         name: &str,
@@ -67,7 +67,7 @@ impl<'a> Graph<'a> {
         (shape.iter().product::<usize>() == values.len()).then_some(Floats { shape, values })
     }
 
-    /// A constant of this many axes.
+    /// Shape and values of a constant, if it has N axes.
     pub(super) fn shaped<const N: usize>(&self, name: &str) -> Option<([usize; N], Vec<f32>)> {
         let Floats { shape, values } = self.floats(name)?;
         Some((shape.try_into().ok()?, values))
@@ -92,14 +92,14 @@ impl<'a> Graph<'a> {
         Some(raw.chain(tensor.int64_data.iter().copied()).collect())
     }
 
-    /// What a scalar is multiplied with, and the scalar.
+    /// If this is a product with a constant scalar: the other factor, and the scalar.
     pub(super) fn scaled(&self, name: &str) -> Option<(&'a str, f32)> {
         let [a, b] = self.inputs(name, "Mul")?;
         self.scalar(b).map(|factor| (a, factor)).or_else(|| Some((b, self.scalar(a)?)))
     }
 
-    /// The map that is convolved in steps of one pixel, without bias and to its own size, and the
-    /// kernels.
+    /// If this is a plain convolution: the map, and the shape and values of the kernels. Plain
+    /// means a square kernel of odd width, stride 1, no bias, and an output of the map's size.
     pub(super) fn convolution(&self, name: &str) -> Option<(&'a str, [usize; 4], Vec<f32>)> {
         let node = self.node(name, "Conv")?;
         let [map, kernels] = inputs(node)?;
@@ -125,13 +125,14 @@ impl<'a> Graph<'a> {
         is_plain.then_some((map, shape, values))
     }
 
-    /// What is reshaped, and the shape that is asked for.
+    /// If this is a `Reshape`: what is reshaped, and the shape asked for.
     pub(super) fn reshaped(&self, name: &str) -> Option<(&'a str, Vec<i64>)> {
         let [from, shape] = self.inputs(name, "Reshape")?;
         Some((from, self.whole(shape)?))
     }
 
-    /// Blocks of 2 x 2 whose channels become pixels, a channel's own one after the other.
+    /// If this turns four channels into each pixel's block of 2 x 2: the input. The four channels
+    /// of one output channel have to lie one after another (mode `CRD`).
     pub(super) fn shuffled(&self, name: &str) -> Option<&'a str> {
         let node = self.node(name, "DepthToSpace")?;
         let is_plain = attribute(node, "blocksize")?.i == 2 && attribute(node, "mode")?.s == b"CRD";

@@ -19,7 +19,7 @@ pub(super) struct Level {
     pub correction: Option<Correction>,
 }
 
-/// Where a level is worked on.
+/// The working memory of a level.
 #[derive(Debug)]
 pub(super) struct LevelSpace {
     upsampling: Upsampling,
@@ -104,7 +104,7 @@ impl Level {
         }
     }
 
-    /// Writes the pressures of a row behind its components.
+    /// Writes the pressures of a row of blocks behind its components.
     fn pressures(&self, row: usize, blocks: &Blocks, values: &mut [f32]) {
         let (wide, side) = (self.wide(), self.layout.side);
         let channels = GROUP * self.components;

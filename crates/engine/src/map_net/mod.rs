@@ -42,27 +42,27 @@ use tract_onnx::pb::ModelProto;
 
 pub(crate) use trial::{Preferred, prefer};
 
-/// The networks of a model, whose answers are added up.
+/// The networks of a model, laid out for the evaluation. The answer is the sum of theirs.
 #[derive(Clone, Debug)]
 pub(crate) struct Runner(Arc<Vec<Net>>);
 
-/// Networks as a graph has them.
+/// The constants of the networks that were found in a graph.
 pub(crate) struct Found(Vec<parts::Parts>);
 
 impl Found {
-    /// The same laid out for the evaluation, in memory of the thread that asks.
+    /// Lays the networks out for the evaluation. The memory is allocated by the calling thread.
     pub(crate) fn runner(&self) -> Runner {
         Runner(Arc::new(self.0.iter().map(Net::new).collect()))
     }
 }
 
-/// Finds out whether a graph is one of these networks, or a mean of several. The constants of the
-/// file have been widened.
+/// Looks for such a network, or a mean of several, in a graph whose 16-bit constants have been
+/// widened. None: the graph is something else.
 pub(crate) fn find(proto: &ModelProto) -> Option<Found> {
     pattern::find(proto).map(Found)
 }
 
-/// A model that is run so.
+/// A model that is evaluated by rows.
 pub(crate) struct MapModel {
     info: ModelInfo,
     runner: Runner,
@@ -114,7 +114,8 @@ impl Session for MapSession {
             Ok(())
         });
         if let Err(error) = done {
-            // What an interrupted run leaves behind is not known: start afresh.
+            // The contents of the workspaces after an interrupted run are unknown, so they are made
+            // anew.
             self.spaces = self.runner.spaces();
             return Err(error);
         }

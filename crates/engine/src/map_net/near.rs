@@ -11,14 +11,14 @@ use super::pressures::{Blocks, Layout};
 use super::sums::{GROUP, MARGIN, Sums, VECTORS, store, vectors, vectors_mut};
 use pulp::{Simd, WithSimd};
 
-/// Positions of which gains are kept at a time.
+/// Number of positions whose gains are kept at a time.
 const CHUNK: usize = VECTORS * MARGIN;
 
 #[derive(Debug)]
 pub(super) struct Near {
     layout: Layout,
     sums: Sums,
-    /// Of each sum, the channel that it is and the gain that it has.
+    /// For each sum, the index of its channel and that of its gain.
     of: Vec<(usize, usize)>,
     gain: Gain,
 }
@@ -37,7 +37,7 @@ impl Near {
         let components = channels / GROUP;
         let places = over_finger.len() / channels;
         let of_channel = |channel: usize| &over_finger[channel * places..(channel + 1) * places];
-        // The pixels of a block mostly have the same gain.
+        // As a rule the four pixels of a block have the same gain.
         let is_shared = (0..channels)
             .all(|channel| of_channel(channel).iter().eq(of_channel(channel / GROUP * GROUP)));
         let gained = (0..channels).step_by(if is_shared { GROUP } else { 1 });
@@ -53,18 +53,19 @@ impl Near {
         Self { layout, sums, gain: Gain::of_rows(&weights, place, *side), of }
     }
 
-    /// Where [`AddNear`] keeps gains.
+    /// The working memory of [`AddNear`].
     pub(super) fn space(&self) -> Vec<f32> {
         vec![0.0; self.gain.groups() * GROUP * CHUNK]
     }
 }
 
-/// Adds what pressures around give, at the blocks that are near to one: elsewhere it is zero.
+/// Adds the near field to a row of components, at the blocks that are near a pressure. Elsewhere it
+/// is zero.
 pub(super) struct AddNear<'a> {
     pub near: &'a Near,
     pub blocks: &'a Blocks,
     pub row: usize,
-    /// A bit for each block that is near to a pressure.
+    /// A bit for each block of the row that is near a pressure.
     pub bits: u128,
     /// A row of components.
     pub to: &'a mut [f32],
@@ -85,7 +86,7 @@ impl WithSimd for AddNear<'_> {
                 2 => self.at::<S, 2>(simd, at),
                 _ => self.at::<S, VECTORS>(simd, at),
             }
-            // Vectors that reach over the run's end have added what is due there too.
+            // Vectors that reach beyond the run's end have added the near field there too.
             let done = (at + vectors * S::F32_LANES) as u32;
             self.bits &= u128::MAX.checked_shl(done).unwrap_or(0);
         }
@@ -104,7 +105,8 @@ impl AddNear<'_> {
                 store::<S>(&gains[channel], &mut space[place..]);
             }
         }
-        // The corner of the kernel: as far before the block as there are zeros around.
+        // The first tap of the kernel lies as far before the block as there are zeros around the
+        // map.
         let corner = &blocks.planes[*row * layout.stride() + at..];
         let wide = layout.side + MARGIN;
         for group in 0..sums.groups() {

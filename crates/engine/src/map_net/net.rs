@@ -47,17 +47,18 @@ fn level(parts: &LevelParts, components: usize) -> Level {
     }
 }
 
-/// All that one thread writes to while it evaluates a network.
+/// The working memory of one thread.
 #[derive(Debug)]
 pub(super) struct Workspace {
     pressures: Pressures,
-    /// What each level is given from above, the finest first.
+    /// The input of each level from the coarser one, the finest level first.
     above: Vec<Above>,
     levels: Vec<LevelSpace>,
     reach: Vec<f32>,
     /// Densities of a row of blocks, `[4, n + MARGIN]`.
     densities: Vec<f32>,
-    /// Densities of pixels of 2 x 2, and what interpolates between them.
+    /// If the network's pixels are 2 x 2 of the map's: their densities, and the interpolation
+    /// between them.
     coarse: Option<(Above, Upsampling)>,
 }
 
@@ -82,12 +83,12 @@ pub(super) struct Work<'a> {
     pub space: &'a mut Workspace,
     pub pressure_pa: &'a [f32],
     pub sed_j_per_m3: &'a mut [f32],
-    /// Whether the densities are added to those that are there.
+    /// Whether the result is added to `sed_j_per_m3` instead of replacing it.
     pub adds: bool,
 }
 
 impl Work<'_> {
-    /// With vectors as wide as this processor has.
+    /// Runs with the widest vectors that this processor has.
     pub(super) fn run(self) {
         Arch::new().dispatch(self);
     }
@@ -101,7 +102,7 @@ impl WithSimd for Work<'_> {
         let Self { net, space, pressure_pa, sed_j_per_m3, adds } = self;
         let Workspace { pressures, above, levels, reach, densities, coarse } = space;
         if !pressures.take(pressure_pa) {
-            // There is no bias anywhere.
+            // The network has no bias, so without pressure its answer is zero.
             if !adds {
                 sed_j_per_m3.fill(0.0);
             }

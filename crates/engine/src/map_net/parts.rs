@@ -3,19 +3,20 @@
 /// A network: `[1, 1, 224, 224]` Pa to `[1, 1, 224, 224]` J/m3.
 #[derive(Debug)]
 pub(super) struct Parts {
-    /// What pressures are multiplied with.
+    /// The factor from Pa to the network's unit.
     pub unit: f32,
-    /// Pixels across one of the network's: 1 or 2.
+    /// Width of one of the network's pixels in pixels of the map: 1 or 2.
     pub pixel: usize,
-    /// Strain components, C.
+    /// Number of strain components, C.
     pub components: usize,
-    /// The finest first.
+    /// The levels, the finest first.
     pub levels: Vec<LevelParts>,
     pub rank: usize,
-    /// `[n^2, rank]` and `[rank, C n^2]`, n of the coarsest level.
+    /// The two matrices of the global map, `[n^2, rank]` and `[rank, C n^2]`, with n of the
+    /// coarsest level.
     pub reach_in: Vec<f32>,
     pub reach_out: Vec<f32>,
-    /// What the densities are multiplied with, `[224, 224]`.
+    /// The factor from the network's densities to J/m3 at each pixel, `[224, 224]`.
     pub mask: Vec<f32>,
 }
 
@@ -23,11 +24,11 @@ pub(super) struct Parts {
 #[derive(Debug)]
 pub(super) struct LevelParts {
     pub side: usize,
-    /// Blocks across the convolution, K.
+    /// Width of the near field's kernel in blocks, K.
     pub kernel: usize,
     /// `[4 C, 4, K, K]`.
     pub near: Vec<f32>,
-    /// `[C, C]`: the matrix that is mixed with before the interpolation.
+    /// `[C, C]`: the matrix that mixes the components from above before they are interpolated.
     pub mix: Vec<f32>,
     /// `[4 C, places]`.
     pub over_finger: Vec<f32>,
@@ -42,7 +43,7 @@ pub(super) struct CorrectionParts {
     pub hidden: usize,
     /// `4 C + 4`.
     pub inputs: usize,
-    /// Blocks across, K.
+    /// Width of the kernels in blocks, K.
     pub kernel: usize,
     /// `[hidden, inputs, K, K]`.
     pub value: Vec<f32>,

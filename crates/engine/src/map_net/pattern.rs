@@ -8,18 +8,20 @@ use super::upsampling::{NEXT, OWN};
 use crate::{INPUT_NAME, MAP_LEN, MAP_SIDE_PX};
 use tract_onnx::pb::ModelProto;
 
-/// Pixels of a block.
+/// Number of pixels in a block.
 const BLOCK: usize = 4;
-/// Most blocks across a convolution.
+/// Greatest width of a convolution, blocks.
 const KERNEL_MAX: usize = 31;
-/// Most members of a mean. They may share constants, so a small file could ask for a lot of memory.
+/// The most members of a mean. Members may share constants, so without a limit a small file could
+/// ask for much memory.
 const MEMBERS_MAX: usize = 8;
-/// Most levels.
+/// The most levels.
 const LEVELS_MAX: usize = 6;
-/// By how much of itself a weight may differ from a product of mix and interpolation: rounding.
+/// Greatest relative difference, by rounding, between a weight and the product of mix and
+/// interpolation.
 const ROUNDING: f32 = 1e-6;
 
-/// The networks whose sum the graph answers with: one, or the members of a mean.
+/// The networks whose sum is the answer of the graph: one network, or the members of a mean.
 pub(super) fn find(model: &ModelProto) -> Option<Vec<Parts>> {
     let graph = Graph::new(model)?;
     if let Some(parts) = network(&graph, graph.output) {
@@ -41,7 +43,7 @@ pub(super) fn find(model: &ModelProto) -> Option<Vec<Parts>> {
     Some(networks)
 }
 
-/// Densities times their unit times a mask.
+/// The network whose output this is: densities, times their unit, times a mask.
 fn network(graph: &Graph<'_>, name: &str) -> Option<Parts> {
     let [sed, mask] = graph.inputs(name, "Mul")?;
     let (shape, mut mask) = graph.shaped::<4>(mask)?;
@@ -82,7 +84,7 @@ struct Reader<'g, 'a> {
 }
 
 impl<'a> Reader<'_, 'a> {
-    /// From the finest components on.
+    /// Reads the levels, beginning with the components of the finest.
     fn read(&self, finest: &'a str, pixel: usize, mask: Vec<f32>) -> Option<Parts> {
         let graph = self.graph;
         let mut levels = Vec::new();
@@ -120,7 +122,7 @@ impl<'a> Reader<'_, 'a> {
         }
     }
 
-    /// The level, its blocks, and what it is given from above.
+    /// A level, its blocks of pressure, and its input from the coarser level.
     fn level(&self, name: &str, side: usize) -> Option<(LevelParts, &'a str, &'a str)> {
         let graph = self.graph;
         let [linear, added] = graph.inputs(name, "Add")?;
@@ -132,7 +134,7 @@ impl<'a> Reader<'_, 'a> {
         Some((level, blocks, above))
     }
 
-    /// A level without its correction.
+    /// The same without the correction.
     fn linear(&self, name: &str, side: usize) -> Option<(LevelParts, &'a str, &'a str)> {
         let graph = self.graph;
         let channels = BLOCK * self.components;
@@ -181,7 +183,7 @@ impl<'a> Reader<'_, 'a> {
         Some(CorrectionParts { hidden, inputs, kernel, value, gate, out, over_finger, place })
     }
 
-    /// Weights and places of a factor about 1.
+    /// The weights and places of a [gain](super::gain).
     fn gain(&self, name: &str, channels: usize, side: usize) -> Option<(Vec<f32>, Vec<f32>)> {
         let graph = self.graph;
         let [varying, one] = graph.inputs(name, "Add")?;
@@ -198,7 +200,7 @@ impl<'a> Reader<'_, 'a> {
         is_due.then_some((weights, place))
     }
 
-    /// The pixels that blocks of 2 x 2 are made of.
+    /// If this arranges pixels in blocks of 2 x 2: the pixels.
     fn blocks(&self, name: &str, side: usize) -> Option<&'a str> {
         let graph = self.graph;
         let side = side as i64;
@@ -212,13 +214,13 @@ impl<'a> Reader<'_, 'a> {
         is_due.then_some(source)
     }
 
-    /// The blocks whose means these are.
+    /// If these are the means of blocks: the blocks.
     fn means(&self, name: &str) -> Option<&'a str> {
         let (blocks, shape, weights) = self.graph.convolution(name)?;
         (shape == [1, BLOCK, 1, 1] && weights == [0.25; BLOCK]).then_some(blocks)
     }
 
-    /// What the map's pressures are multiplied with to be the network's pixels.
+    /// The factor between the input in Pa and the network's pixels.
     fn unit(&self, name: &'a str, pixel: usize) -> Option<f32> {
         let pixels =
             if pixel == 2 { self.blocks(self.means(name)?, MAP_SIDE_PX / 2)? } else { name };
@@ -226,7 +228,7 @@ impl<'a> Reader<'_, 'a> {
         (map == INPUT_NAME).then_some(unit)
     }
 
-    /// The global map, from the means of the coarsest blocks: rank and both matrices.
+    /// The global map, from the means of the coarsest blocks: its rank and both matrices.
     fn reach(&self, name: &str, blocks: &str, side: usize) -> Option<(usize, Vec<f32>, Vec<f32>)> {
         let graph = self.graph;
         let pixels = side * side;
@@ -247,8 +249,8 @@ impl<'a> Reader<'_, 'a> {
     }
 }
 
-/// The matrix that kernels `[4 C, C, 3, 3]` mix components with before they interpolate, if that is
-/// what they do.
+/// Takes kernels `[4 C, C, 3, 3]` apart into a C x C matrix and the fixed weights of the
+/// interpolation. Returns the matrix; None if the kernels are no such product.
 fn mixed(shape: [usize; 4], weights: &[f32]) -> Option<Vec<f32>> {
     let [channels, components, rows, columns] = shape;
     if [rows, columns] != [3, 3] || channels != BLOCK * components {
@@ -262,7 +264,7 @@ fn mixed(shape: [usize; 4], weights: &[f32]) -> Option<Vec<f32>> {
     };
     let mut mix = Vec::with_capacity(components * components);
     for of_component in weights.chunks_exact(BLOCK * components * 9) {
-        // The first pixel's corner has a weight of 1/16, by which dividing is exact.
+        // The corner weight of the first pixel is 1/16, so the division is exact.
         let row = (0..components).map(|from| of_component[9 * from] / between(0, 0));
         mix.extend(row);
         let row = &mix[mix.len() - components..];

@@ -6,27 +6,27 @@ use crate::MAP_SIDE_PX;
 use pulp::Simd;
 use std::ops::Range;
 
-/// Rows and columns of blocks of the map.
+/// Blocks in a row or a column of the map.
 const SIDE: usize = MAP_SIDE_PX / 2;
-/// Blocks that are made pixels at a time. A range of columns begins at a multiple of MARGIN.
+/// Blocks that are turned into pixels at a time. A range of columns begins at a multiple of MARGIN.
 const STEP: usize = 8;
 
-/// The end of the network: which densities are answered, in which unit.
+/// The last step of the network: its mask, and the columns in which that is not zero.
 #[derive(Debug)]
 pub(super) struct Pixels {
-    /// What the densities are multiplied with, `[224, 224]`.
+    /// The factor from the network's densities to J/m3 at each pixel, `[224, 224]`.
     mask: Vec<f32>,
-    /// Of each row of blocks, those that are not all blank.
+    /// For each row of blocks, the range of columns outside which the mask is zero.
     columns: Vec<Range<usize>>,
 }
 
-/// What a level's rows become.
+/// Where a level's rows go.
 pub(super) enum Target<'a> {
-    /// What the next level is given from above.
+    /// They are the input of the next finer level.
     Next(&'a mut Above),
-    /// Densities of pixels of 2 x 2, to be interpolated.
+    /// They become densities of pixels of 2 x 2, which are interpolated later.
     Densities { row: &'a mut [f32], map: &'a mut Above },
-    /// Densities of pixels.
+    /// They become densities of the map's pixels.
     Pixels { row: &'a mut [f32], pixels: &'a Pixels, map: &'a mut [f32], adds: bool },
 }
 
@@ -71,7 +71,7 @@ impl Pixels {
         }
     }
 
-    /// Pixels between those of 2 x 2.
+    /// Interpolates the densities of pixels of 2 x 2, and writes the map.
     #[inline(always)]
     pub(super) fn interpolate<S: Simd>(
         &self,
@@ -91,7 +91,7 @@ impl Pixels {
 }
 
 impl Target<'_> {
-    /// The columns of a row that are asked for, if not all.
+    /// The columns of a row that are needed; None: all.
     pub(super) fn columns(&self, row: usize) -> Option<Range<usize>> {
         match self {
             Self::Pixels { pixels, .. } => Some(pixels.columns[row].clone()),
@@ -99,12 +99,12 @@ impl Target<'_> {
         }
     }
 
-    /// Whether it takes components without a row of them being written.
+    /// Whether it can take components that were not written to a row.
     pub(super) fn takes_phases(&self) -> bool {
         matches!(self, Self::Pixels { .. })
     }
 
-    /// Takes a row that comes from above alone.
+    /// Takes a row to which only the coarser level contributes.
     #[inline(always)]
     pub(super) fn take_phases<S: Simd>(
         &mut self,
@@ -143,7 +143,7 @@ impl Target<'_> {
     }
 }
 
-/// Sums of the squares of all components: `[4, n + MARGIN]`.
+/// Computes the sums of the squares of all components: `[4, n + MARGIN]`.
 #[inline(always)]
 fn squares<S: Simd>(
     simd: S,
@@ -167,7 +167,7 @@ fn squares<S: Simd>(
     }
 }
 
-/// Four values of each block of a row become pixels of two rows.
+/// Turns the four values of each block of a row into pixels of two rows.
 #[inline(always)]
 fn to_pixels(blocks: &[f32], side: usize, channel: usize, row: usize, above: &mut Above) {
     let wide = side + MARGIN;
@@ -180,7 +180,8 @@ fn to_pixels(blocks: &[f32], side: usize, channel: usize, row: usize, above: &mu
     }
 }
 
-/// Writes values of two rows in turn. `write`: of what was there, a value and where it comes.
+/// Writes values of two rows alternately. `write` is given the old value, the new value and its
+/// place, and returns what is stored.
 #[inline(always)]
 fn interleave(left: &[f32], right: &[f32], to: &mut [f32], write: impl Fn(f32, f32, usize) -> f32) {
     let count = left.len() / STEP;

@@ -5,17 +5,17 @@ use std::ops::Range;
 use super::sums::MARGIN;
 use crate::{MAP_LEN, MAP_SIDE_PX};
 
-/// A pressure below this is none, Pa. Squares of what it causes may be denormal numbers, which
-/// processors are slow with; as SED it is less than 1e-20 J/m3.
+/// Pressures below this count as zero, Pa. The squares of the strain components that they cause may
+/// be denormal numbers, with which processors are slow; as SED they are less than 1e-20 J/m3.
 const PRESSURE_MIN_PA: f32 = 1e-9;
 
-/// How the blocks of a level lie in memory: four planes, of the pixels above left, above right,
-/// below left and below right, each with zeros around.
+/// How the blocks of a level lie in memory: in four planes, for the pixels above left, above right,
+/// below left and below right of each block. Each plane has zeros around it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
-    /// Blocks across.
+    /// Blocks in a row or a column.
     pub side: usize,
-    /// Zeros around: what a convolution reaches over.
+    /// Width of the zeros around a plane: as far as a convolution reaches.
     pub around: usize,
 }
 
@@ -28,7 +28,7 @@ impl Layout {
         self.stride() * (self.side + 2 * self.around)
     }
 
-    /// Where a block of the first plane lies.
+    /// Index of a block in the first plane.
     pub(super) fn place(self, row: usize, column: usize) -> usize {
         (row + self.around) * self.stride() + column + self.around
     }
@@ -43,7 +43,7 @@ impl Layout {
 pub(super) struct Blocks {
     pub layout: Layout,
     pub planes: Vec<f32>,
-    /// Of each row, a bit for every block with pressure.
+    /// For each row, a bit for each block with pressure.
     some: Vec<u128>,
 }
 
@@ -52,7 +52,7 @@ impl Blocks {
         Self { layout, planes: vec![0.0; layout.len()], some: vec![0; layout.side] }
     }
 
-    /// Of a row, a bit for each block that a pressure is near to: at most `around` blocks away.
+    /// A bit for each block of a row that has a pressure at most `around` blocks away.
     pub(super) fn near(&self, row: usize) -> u128 {
         let Layout { side, around } = self.layout;
         let rows = row.saturating_sub(around)..(row + around + 1).min(side);
@@ -69,8 +69,8 @@ impl Blocks {
         &self.planes[at..at + self.layout.side]
     }
 
-    /// Takes a row of blocks from two rows of pixels, and gives the mean of each block. False if
-    /// all is zero as it was.
+    /// Takes a row of blocks from two rows of pixels, and writes the mean of each block. False: the
+    /// row is zero and was zero before, so nothing was written.
     #[inline(always)]
     fn take(&mut self, row: usize, pixels: [&[f32]; 2], means: &mut [f32]) -> bool {
         let some = bits(pixels);
@@ -92,7 +92,7 @@ impl Blocks {
     }
 }
 
-/// A bit for every block of two rows of pixels that are not all zero.
+/// A bit for each block of two rows of pixels that is not all zero.
 #[inline(always)]
 fn bits([upper, lower]: [&[f32]; 2]) -> u128 {
     const BLOCKS: usize = 8;
@@ -115,18 +115,18 @@ fn bits([upper, lower]: [&[f32]; 2]) -> u128 {
 /// The pressures of a map, at every level.
 #[derive(Debug)]
 pub(super) struct Pressures {
-    /// What a pressure is multiplied with.
+    /// The factor from Pa to the network's unit.
     unit: f32,
     /// Two rows of the map in the network's unit.
     rows: Vec<f32>,
-    /// Pixels across one of the network's: 1 or 2.
+    /// Width of one of the network's pixels in pixels of the map: 1 or 2.
     pixel: usize,
     /// The finest first.
     pub levels: Vec<Blocks>,
-    /// The pixels that each level's blocks are made of, and behind them the means of the coarsest
-    /// blocks. The first is empty if those are the map's own.
+    /// The pixels that each level's blocks are made of, and last the means of the coarsest blocks.
+    /// The first is empty if the network's pixels are the map's own.
     maps: Vec<Vec<f32>>,
-    /// Rows of the map in which there was any pressure, of two rows each.
+    /// Which pairs of rows of the map had any pressure the last time.
     had_some: Vec<bool>,
 }
 
@@ -149,12 +149,12 @@ impl Pressures {
         }
     }
 
-    /// Means of the coarsest blocks.
+    /// The means of the coarsest blocks.
     pub(super) fn coarsest(&self) -> &[f32] {
         self.maps.last().map_or(&[], |map| &map[..])
     }
 
-    /// Takes a map, Pa. False if there is no pressure in it.
+    /// Takes a map, Pa. False: there is no pressure in it.
     #[inline(always)]
     pub(super) fn take(&mut self, pressure_pa: &[f32]) -> bool {
         debug_assert_eq!(pressure_pa.len(), MAP_LEN);
@@ -192,7 +192,7 @@ impl Pressures {
     }
 }
 
-/// Means of blocks of two rows of pixels.
+/// Writes the means of the blocks of two rows of pixels.
 #[inline(always)]
 fn halve([upper, lower]: [&[f32]; 2], means: &mut [f32]) {
     let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);

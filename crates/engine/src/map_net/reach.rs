@@ -4,7 +4,7 @@ use super::sums::{settled, store, vectors};
 use super::upsampling::Above;
 use pulp::Simd;
 
-/// Values that are summed up at a time.
+/// Number of components that are computed at a time.
 const CHUNK: usize = 32;
 
 #[derive(Debug)]
@@ -13,7 +13,7 @@ pub(super) struct Reach {
     side: usize,
     /// `[n^2, rank]`.
     inward: Vec<f32>,
-    /// `[C n^2 / CHUNK, rank, CHUNK]`: one after the other as they are read.
+    /// `[C n^2 / CHUNK, rank, CHUNK]`, stored in the order in which they are read.
     outward: Vec<f32>,
 }
 
@@ -33,7 +33,7 @@ impl Reach {
         Self { rank, side, inward: inward.iter().copied().map(settled).collect(), outward: chunks }
     }
 
-    /// What [`Self::write`] works in: the inner numbers, then components one after the other.
+    /// The working memory of [`Self::write`]: the `rank` inner numbers, then the components.
     pub(super) fn space(&self) -> Vec<f32> {
         vec![0.0; self.rank + self.outward.len() / self.rank]
     }
@@ -73,7 +73,7 @@ impl Reach {
     }
 }
 
-/// A chunk of components, from vectors as wide as it.
+/// Computes a chunk of components, V vectors at a time.
 #[inline(always)]
 fn outward<S: Simd, const V: usize>(
     simd: S,

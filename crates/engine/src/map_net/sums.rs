@@ -3,18 +3,19 @@
 use pulp::Simd;
 use std::ops::Range;
 
-/// Channels whose sums are in registers at a time. With three vectors of positions each that is
-/// twelve sums, three vectors and a weight: the sixteen registers of AVX2.
+/// Channels whose sums are kept in registers at a time. With three vectors of positions for each
+/// that takes twelve registers for sums, three for values and one for a weight: the sixteen of
+/// AVX2.
 pub(super) const GROUP: usize = 4;
-/// Most vectors of positions at a time.
+/// The most vectors of positions at a time.
 pub(super) const VECTORS: usize = 3;
-/// Values behind the last position that a vector may reach over.
+/// How many values a vector may reach beyond the last position.
 pub(super) const MARGIN: usize = 16;
-/// Weights below this are none. Products of them may be denormal numbers, which processors are slow
-/// with; beside other weights they are lost in rounding.
+/// Weights below this count as zero. Products with them may be denormal numbers, with which
+/// processors are slow; beside other weights they are lost in rounding.
 const WEIGHT_MIN: f32 = 1e-20;
 
-/// A weight, or 0 if it is none.
+/// The weight, or 0 if it is below [`WEIGHT_MIN`].
 pub(super) fn settled(weight: f32) -> f32 {
     if weight.abs() < WEIGHT_MIN { 0.0 } else { weight }
 }
@@ -22,16 +23,16 @@ pub(super) fn settled(weight: f32) -> f32 {
 /// `y[o] = sum over t of w[o, t] x[t]`, where `x[t]` lies `taps[t]` values behind the position.
 #[derive(Debug)]
 pub(super) struct Sums {
-    /// Of each group of channels, its taps and weights.
+    /// For each group of channels, the range of its taps and weights.
     groups: Vec<Range<usize>>,
     taps: Vec<usize>,
-    /// 0 beyond the last channel.
+    /// One weight for each channel of the group; 0 beyond the last channel.
     weights: Vec<[f32; GROUP]>,
 }
 
 impl Sums {
-    /// `weight`: of a channel and a tap. Taps that have no weight in any channel of a group are
-    /// left out of it.
+    /// `weight` gives the weight of a channel and a tap. A tap whose weights are zero in all
+    /// channels of a group is left out of that group.
     pub(super) fn new(
         taps: &[usize],
         channels: usize,
@@ -70,9 +71,9 @@ impl Sums {
         self.and(simd, 0.0, group, map)
     }
 
-    /// As [`Self::of_group`], a number added.
-    // By numbers and not by iterators: as many of these as there are here the compiler leaves
-    // uninlined, and a call costs as much as a tap.
+    /// As [`Self::of_group`], with `number` added to each sum.
+    // The loops use indices, since the compiler leaves this many iterators uninlined, and a call
+    // costs as much as a tap.
     #[inline(always)]
     pub(super) fn and<S: Simd, const V: usize>(
         &self,
@@ -97,26 +98,26 @@ impl Sums {
     }
 }
 
-/// So many vectors from the beginning of a row.
+/// The first `count` vectors of a row.
 #[inline(always)]
 pub(super) fn vectors<S: Simd>(from: &[f32], count: usize) -> &[S::f32s] {
     &S::as_simd_f32s(&from[..count * S::F32_LANES]).0[..count]
 }
 
-/// As [`vectors`], to be written to.
+/// As [`vectors`], mutable.
 #[inline(always)]
 pub(super) fn vectors_mut<S: Simd>(from: &mut [f32], count: usize) -> &mut [S::f32s] {
     &mut S::as_mut_simd_f32s(&mut from[..count * S::F32_LANES]).0[..count]
 }
 
-/// Stores vectors one behind the other.
+/// Stores vectors one after another.
 #[inline(always)]
 pub(super) fn store<S: Simd>(vectors: &[S::f32s], to: &mut [f32]) {
     S::as_mut_simd_f32s(&mut to[..vectors.len() * S::F32_LANES]).0.copy_from_slice(vectors);
 }
 
-/// Goes over positions in steps of V vectors. The last step may reach over the end by less than a
-/// vector.
+/// Goes over positions in steps of one, two or three vectors. The last step may reach beyond the
+/// end by less than a vector.
 macro_rules! in_vectors {
     ($simd:ty, $from:expr, $to:expr, $at:ident, $count:ident => $step:expr) => {{
         let (mut $at, to) = ($from, $to);

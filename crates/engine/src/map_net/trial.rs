@@ -4,18 +4,18 @@ use super::{Found, MapModel};
 use crate::{EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, trial_map};
 use std::sync::Arc;
 
-/// The answers may differ by this much of the greatest value: rounding.
+/// Greatest difference between the answers that counts as rounding, relative to the greatest value.
 pub(super) const DIFFERENCE_MAX: f32 = 1e-5;
 
-/// What is to run a model.
+/// How a model is to be run.
 pub(crate) enum Preferred {
     Plain(Arc<dyn Model>),
-    /// By rows; the plain graph is not kept.
+    /// By rows. The plain graph is not kept.
     ByRows(Box<ModelInfo>, Found),
 }
 
 impl Preferred {
-    /// The model, in memory of the thread that asks.
+    /// The model. A model that is run by rows is laid out in memory of the calling thread.
     pub(crate) fn into_model(self) -> Arc<dyn Model> {
         match self {
             Self::Plain(model) => model,
@@ -24,10 +24,11 @@ impl Preferred {
     }
 }
 
-/// The evaluation by rows if it answers as the plain graph does, else the plain graph.
+/// Chooses the evaluation by rows if its answers are those of the plain graph, else the plain
+/// graph.
 ///
 /// # Errors
-/// What the plain graph fails with.
+/// A session cannot be made.
 pub(crate) fn prefer(
     plain: Arc<dyn Model>,
     networks: Option<Found>,
@@ -69,15 +70,15 @@ pub(crate) fn prefer(
     Ok(Preferred::ByRows(Box::new(plain.info().clone()), networks))
 }
 
-/// The greatest difference over the greatest value that is due.
+/// The greatest difference, relative to the greatest value of `due`.
 pub(super) fn difference(found: &[f32], due: &[f32]) -> f32 {
     let greatest = due.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
     let apart = found.iter().zip(due).map(|(a, b)| (a - b).abs());
     apart.fold(0.0, f32::max) / greatest
 }
 
-/// A contact, the same all over the map, two contacts far apart, and single pixels at the map's
-/// corners and in its middle.
+/// The trial maps: a round contact, pressure all over the map, two contacts, and single pixels at
+/// the map's corners and in its middle.
 pub(super) fn trials(max_pa: f32) -> [Vec<f32>; 4] {
     let round = trial_map(max_pa);
     let whole = (0..MAP_LEN).map(|i| 0.1 * max_pa * (0.2 + (i % 7) as f32)).collect();

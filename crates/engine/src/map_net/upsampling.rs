@@ -9,10 +9,10 @@ use super::sums::{GROUP, MARGIN, Sums, in_vectors, store, vectors, vectors_mut};
 use pulp::Simd;
 use std::ops::Range;
 
-/// Weights of the interpolation: of the pixel itself and of its neighbour.
+/// Weights of the interpolation: that of the pixel itself and that of its neighbour.
 pub(super) const OWN: f32 = 0.75;
 pub(super) const NEXT: f32 = 0.25;
-/// Rows that are kept: the one above, its own and the one below.
+/// Number of rows that are kept: the one above, the row itself and the one below.
 const ROWS: usize = 3;
 
 /// Components before they are mixed: `[C, n, n + MARGIN]`, with zeros in the margin.
@@ -24,7 +24,7 @@ pub(super) struct Above {
 
 impl Above {
     pub(super) fn new(channels: usize, side: usize) -> Self {
-        // More for the vectors that reach over the end of the last row.
+        // Longer, for vectors that reach beyond the end of the last row.
         Self { side, values: vec![0.0; channels * side * (side + MARGIN) + MARGIN] }
     }
 
@@ -41,20 +41,22 @@ impl Above {
     }
 }
 
-/// The matrix of a mix.
+/// The sums that mix the components by a matrix.
 pub(super) fn mix(channels: usize, side: usize, weight: impl Fn(usize, usize) -> f32) -> Sums {
     let taps: Vec<_> = (0..channels).map(|channel| channel * Above::plane_len(side)).collect();
     Sums::new(&taps, channels, weight)
 }
 
-/// Three rows at work.
+/// The three rows that the interpolation works on.
 #[derive(Debug)]
 pub(super) struct Upsampling {
     side: usize,
     channels: usize,
-    /// A row of each channel, with zeros before and behind: `[C, MARGIN + n + MARGIN]`.
+    /// A row of each channel after the mix, `[C, MARGIN + n + MARGIN]`, with zeros before and
+    /// behind.
     mixed: Vec<f32>,
-    /// Interpolated along the row: `[3, n / lanes, C, 2]` vectors, to the left and to the right.
+    /// Values interpolated along each row: `[3, n / lanes, C, 2]` vectors, of the left and the
+    /// right half of each pixel.
     halves: Vec<f32>,
 }
 
@@ -73,7 +75,7 @@ impl Upsampling {
         self.channels * 2 * self.side.next_multiple_of(MARGIN)
     }
 
-    /// Before the first row.
+    /// Prepares for the first row.
     #[inline(always)]
     pub(super) fn begin<S: Simd>(&mut self, simd: S, above: &Above, mix: Option<&Sums>) {
         let len = self.row_len();
@@ -81,7 +83,7 @@ impl Upsampling {
         self.take(simd, above, mix, 0);
     }
 
-    /// Makes a row ready to be written; rows come one after the other.
+    /// Prepares a row for writing. Rows must come one after another.
     #[inline(always)]
     pub(super) fn advance<S: Simd>(
         &mut self,
@@ -137,14 +139,15 @@ impl Upsampling {
         }
     }
 
-    /// A row's vectors.
+    /// The vectors of one of the kept rows.
     #[inline(always)]
     fn line<S: Simd>(&self, row: usize) -> &[S::f32s] {
         let len = self.row_len();
         vectors::<S>(&self.halves[row % ROWS * len..], len / S::F32_LANES)
     }
 
-    /// A row of components: `[4 C, n + MARGIN]`. Columns begin at a multiple of MARGIN.
+    /// Writes a row of components: `[4 C, n + MARGIN]`. `columns` must begin at a multiple of
+    /// MARGIN.
     #[inline(always)]
     pub(super) fn write<S: Simd>(
         &self,
@@ -170,7 +173,8 @@ impl Upsampling {
         }
     }
 
-    /// Sums of the squares of a row of components: `[4, n + MARGIN]`. Columns as above.
+    /// Writes the sums of the squares of a row of components: `[4, n + MARGIN]`. `columns` as
+    /// above.
     #[inline(always)]
     pub(super) fn write_squares<S: Simd>(
         &self,
@@ -201,7 +205,7 @@ impl Upsampling {
     }
 }
 
-/// The four rows of a group, one after another, each from a column on.
+/// The vectors of the four rows of a group, each from column `from` on.
 #[inline(always)]
 fn quarters<S: Simd>(
     rows: &mut [f32],
@@ -220,8 +224,8 @@ fn quarters<S: Simd>(
     ]
 }
 
-/// Values at a vector of blocks: above left, above right, below left, below right. Of the row and
-/// its neighbours, each interpolated to the left and to the right.
+/// The values above left, above right, below left and below right of a vector of pixels. The inputs
+/// are the row itself and its neighbours, each interpolated to the left and to the right.
 #[inline(always)]
 fn phases<S: Simd>(
     simd: S,

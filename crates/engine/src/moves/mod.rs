@@ -14,9 +14,10 @@ use reorder::Reorder;
 use tract_onnx::tract_core::internal::*;
 use tract_onnx::tract_core::ops::change_axes::AxisOp;
 
-/// Replaces every chain of axis operations that moves an axis. What is no nest of loops stays.
+/// Replaces every chain of axis operations that moves an axis. A chain that is no nest of loops
+/// stays.
 pub(crate) fn run_by_rows(mut model: TypedModel) -> TractResult<TypedModel> {
-    // From the outputs on, so that a chain is found from its end.
+    // This begins at the outputs, so that each chain is found from its end.
     for end in model.eval_order()?.into_iter().rev() {
         if let Some((start, order)) = chain(&model, end)? {
             replace(&mut model, start, end, "rows", order)?;

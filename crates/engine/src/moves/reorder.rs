@@ -3,10 +3,11 @@
 use pulp::{Arch, NullaryFnOnce};
 use tract_onnx::tract_core::internal::*;
 
-/// Most loops around the two innermost.
+/// The most loops around the two innermost.
 const OUTER_MAX: usize = 6;
 
-/// One loop over the values to be written: how many, and how far apart they are read.
+/// One loop over the values to be written: the number of turns, and the distance in the source from
+/// one to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Loop {
     count: usize,
@@ -17,13 +18,14 @@ struct Loop {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Reorder {
     shape: TVec<usize>,
-    /// The two innermost, the innermost first.
+    /// The two innermost loops, the innermost first.
     tile: [Loop; 2],
     outer: Vec<Loop>,
 }
 
 impl Reorder {
-    /// `index`: where each value in turn is read. None if no nest of loops reads so.
+    /// `index` gives the place in the source of each value in turn. None: no nest of loops reads in
+    /// this order.
     pub(super) fn new(shape: TVec<usize>, index: &[u32]) -> Option<Self> {
         let at = |k: usize| index.get(k).map(|&at| at as usize);
         let mut loops = Vec::new();
@@ -70,7 +72,7 @@ impl NullaryFnOnce for Work<'_> {
         let (mut turns, mut first) = ([0; OUTER_MAX], 0);
         for target in self.target.chunks_exact_mut(tile[0].count * tile[1].count) {
             write(*tile, &self.source[first..], target);
-            // The innermost loop that has not ended goes on; those within it begin again.
+            // Advances the innermost loop that has not ended, and restarts those within it.
             for (turn, step) in turns.iter_mut().zip(outer) {
                 *turn += 1;
                 first += step.stride;

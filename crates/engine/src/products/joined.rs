@@ -2,7 +2,7 @@
 
 use tract_onnx::tract_core::internal::*;
 
-/// Hands its input on: no rewriting looks behind it.
+/// Passes its input on. tract's rewriting rules do not look behind it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Joined;
 

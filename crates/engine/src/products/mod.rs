@@ -16,7 +16,7 @@ use stacked::Stacked;
 use tract_onnx::tract_core::internal::*;
 use tract_onnx::tract_core::ops::{array::TypedConcat, einsum::EinSum};
 
-/// Keeps what is joined together: to be done before the graph is decluttered.
+/// Keeps joined columns together. This has to be called before the graph is decluttered.
 pub(crate) fn keep_joined(mut model: TypedModel) -> TractResult<TypedModel> {
     for node in model.eval_order()? {
         if model.nodes[node].op_is::<TypedConcat>()
@@ -34,7 +34,7 @@ fn f32_fact(model: &TypedModel, node: usize) -> TractResult<TypedFact> {
     Ok(model.outlet_fact(node.into())?.without_value())
 }
 
-/// Replaces products with stacks of constant matrices: in a graph that is decluttered.
+/// Replaces products with stacks of constant matrices. The graph must have been decluttered.
 pub(crate) fn stack(mut model: TypedModel) -> TractResult<TypedModel> {
     for node in model.eval_order()? {
         if let Some(product) = stacked(&model, node)? {
@@ -46,12 +46,13 @@ pub(crate) fn stack(mut model: TypedModel) -> TractResult<TypedModel> {
     Ok(model)
 }
 
-/// Bytes and products of the matrices of a node that is a stacked product.
+/// If a node is a stacked product: bytes of its matrices, and number of products that one map
+/// takes.
 pub(crate) fn table(node: &TypedNode) -> Option<(u64, u64)> {
     node.op_as::<Stacked>().map(Stacked::size)
 }
 
-/// The product at a node, if its second side is a constant stack of matrices.
+/// The product at a node, if its second input is a constant stack of matrices.
 fn stacked(model: &TypedModel, node: usize) -> TractResult<Option<Stacked>> {
     let node = &model.nodes[node];
     let Some(product) = node.op_as::<EinSum>() else { return Ok(None) };
@@ -77,7 +78,8 @@ fn stacked(model: &TypedModel, node: usize) -> TractResult<Option<Stacked>> {
     Stacked::new(matrices, rows[rows.len() - 2], made).map(Some)
 }
 
-/// Whether the axes are `..smk,skn->..smn`: in each of `s`, rows by a matrix of its own.
+/// Whether the axes are `..smk,skn->..smn`: for each `s`, rows are multiplied by a matrix of their
+/// own.
 fn is_stack(axes: &str) -> bool {
     let Some((sides, made)) = axes.split_once("->") else { return false };
     let Some((rows, matrices)) = sides.split_once(',') else { return false };

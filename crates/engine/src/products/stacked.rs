@@ -7,10 +7,10 @@ use tract_onnx::tract_core::internal::*;
 /// `y[s, m, n] = sum over k of x[s, m, k] w[s, k, n]`.
 #[derive(Clone, Debug)]
 pub(super) struct Stacked {
-    /// Of what it makes; the last two are `m` and `n`.
+    /// Shape of the output; the last two axes are `m` and `n`.
     shape: TVec<usize>,
     sizes: Sizes,
-    /// `w`, as it is stored.
+    /// `w`, row-major.
     matrices: Arc<Vec<f32>>,
 }
 
@@ -22,21 +22,21 @@ struct Sizes {
 }
 
 impl Stacked {
-    /// `m` rows a matrix; `shape` is that of what is made.
+    /// `m` is the number of rows for each matrix, `shape` that of the output.
     pub(super) fn new(matrices: &Tensor, m: usize, shape: &[usize]) -> TractResult<Self> {
         let &[_, k, n] = matrices.shape() else { bail!("no stack of matrices") };
         let matrices = Arc::new(matrices.try_as_plain_ram()?.as_slice::<f32>()?.to_vec());
         Ok(Self { shape: shape.into(), sizes: Sizes { m, k, n }, matrices })
     }
 
-    /// Bytes of the matrices, and products of a map.
+    /// Bytes of the matrices, and number of products that one map takes.
     pub(super) fn size(&self) -> (u64, u64) {
         let values = self.matrices.len();
         (size_of_val(&self.matrices[..]) as u64, (values * self.sizes.m) as u64)
     }
 }
 
-/// Vectors of sums that two rows have in registers.
+/// Vectors of sums for each row that are kept in registers.
 const TILE: usize = 6;
 
 struct Work<'a> {
@@ -69,7 +69,7 @@ impl WithSimd for Work<'_> {
     }
 }
 
-/// `R` rows by one matrix. A vector of the matrix is read once for all rows.
+/// Multiplies `R` rows by one matrix. Each vector of the matrix is read once for all rows.
 #[inline(always)]
 fn product<S: Simd, const R: usize>(
     simd: S,

@@ -12,15 +12,15 @@ pub(super) struct SparseMap {
     table: Arc<Table>,
 }
 
-/// The rows that are not empty, in runs of neighbours. Every row has `degree` terms; one with
-/// fewer is filled up with weights of 0 on a term of its own.
+/// The rows that are not empty, as runs of consecutive rows. Every row has `degree` terms; a row
+/// with fewer is padded with terms of weight 0, whose source is one of its own.
 #[derive(Debug)]
 struct Table {
     runs: Vec<Run>,
     degree: usize,
-    /// Sources of all first terms, of all second terms and so on.
+    /// The source of the first term of every row, then of the second term of every row, and so on.
     index: Index,
-    /// Likewise.
+    /// The weights, in the same order.
     weight: Vec<f32>,
 }
 
@@ -30,13 +30,13 @@ struct Run {
     rows: usize,
 }
 
-/// Sources of up to this many values are copied to where no index can miss: without a check of
-/// each, the compiler makes vectors of the loop.
+/// Sources of up to this many values are copied into an array of this length. Indices are taken
+/// modulo that length, so they need no check, and the compiler can vectorise the loop.
 const NEAR_LEN: usize = 2048;
 
 #[derive(Debug)]
 enum Index {
-    /// Below `NEAR_LEN`.
+    /// The source has at most `NEAR_LEN` values.
     Near(Vec<u16>),
     Far(Vec<u32>),
 }
@@ -75,7 +75,7 @@ impl SparseMap {
 }
 
 impl SparseMap {
-    /// Bytes and terms of the table.
+    /// Bytes of the table, and number of its terms.
     pub(super) fn size(&self) -> (u64, u64) {
         let terms = self.table.weight.len();
         let index_bytes = match self.table.index {
@@ -86,7 +86,7 @@ impl SparseMap {
     }
 }
 
-/// A table of near sources at work.
+/// One evaluation of a table with near sources.
 struct Near<'a> {
     table: &'a Table,
     index: &'a [u16],
@@ -110,14 +110,14 @@ impl Table {
             Index::Near(index) => {
                 let mut near = [0.0; NEAR_LEN];
                 near[..source.len()].copy_from_slice(source);
-                // With vectors as wide as this processor has.
+                // Uses the widest vectors that this processor has.
                 Arch::new().dispatch(Near { table: self, index, source: &near, target });
             }
             Index::Far(index) => self.apply_by(index, |at| source[at as usize], target),
         }
     }
 
-    /// The degrees that models have get loops of their own, which the compiler unrolls.
+    /// The degrees that occur in models have loops of their own, which the compiler unrolls.
     #[inline(always)]
     fn apply_by<I: Copy>(&self, index: &[I], value: impl Fn(I) -> f32, target: &mut [f32]) {
         match self.degree {

@@ -23,9 +23,10 @@ use tract_onnx::tract_core::ops::{
     nn::{Reduce, Reducer},
 };
 
-/// Replaces every chain that holds a `Gather` of constant indices. What it cannot read stays.
+/// Replaces every chain that holds a `Gather` with constant indices. A chain that it cannot read
+/// stays.
 pub(crate) fn fuse(mut model: TypedModel) -> TractResult<TypedModel> {
-    // From the outputs on, so that a chain is found from its end.
+    // This begins at the outputs, so that each chain is found from its end.
     for end in model.eval_order()?.into_iter().rev() {
         if let Some((start, map)) = chain(&model, end)? {
             replace(&mut model, start, end, "sparse", map)?;
@@ -35,7 +36,7 @@ pub(crate) fn fuse(mut model: TypedModel) -> TractResult<TypedModel> {
     Ok(model)
 }
 
-/// Bytes and terms of the table of a node that is a sparse map.
+/// If a node is a sparse map: bytes of its table, and number of its terms.
 pub(crate) fn table(node: &TypedNode) -> Option<(u64, u64)> {
     node.op_as::<SparseMap>().map(SparseMap::size)
 }
@@ -47,7 +48,7 @@ fn chain(model: &TypedModel, end: usize) -> TractResult<Option<(OutletId, Sparse
     let mut start = None;
     while let Some(input) = link(model, at)? {
         let node = &model.nodes[at];
-        // Sums before a pick would be taken once for every time that they are picked.
+        // A sum that is picked several times would be computed anew each time.
         if gathers && node.op_is::<Reduce>() {
             break;
         }
@@ -73,7 +74,7 @@ fn chain(model: &TypedModel, end: usize) -> TractResult<Option<(OutletId, Sparse
     Ok(terms.map(|terms| (start, SparseMap::new(&terms, source_len))))
 }
 
-/// The input that a link of a chain acts on; none if the node is no link.
+/// The input that a link of a chain acts on; None if the node cannot be part of a chain.
 fn link(model: &TypedModel, node: usize) -> TractResult<Option<OutletId>> {
     let node = &model.nodes[node];
     let facts = model.node_input_facts(node.id)?;
@@ -91,7 +92,7 @@ fn link(model: &TypedModel, node: usize) -> TractResult<Option<OutletId>> {
     Ok(acts_on.filter(|&input| is_f32(facts[input])).map(|input| node.inputs[input]))
 }
 
-/// Which input of a product is the constant, if one is.
+/// Which of the two inputs of a product is the constant; None if not exactly one is.
 fn factor(facts: &[&TypedFact]) -> Option<usize> {
     let [a, b] = facts else { return None };
     match (a.konst.is_some(), b.konst.is_some()) {
@@ -101,7 +102,7 @@ fn factor(facts: &[&TypedFact]) -> Option<usize> {
     }
 }
 
-/// One link more; none where it cannot be read.
+/// Adds one link to the chain's terms; None if it cannot be read.
 fn step(model: &TypedModel, node: usize, terms: &Terms) -> TractResult<Option<Terms>> {
     let facts = model.node_input_facts(node)?;
     let node = &model.nodes[node];

@@ -2,7 +2,7 @@
 
 use tract_onnx::tract_core::internal::{TVec, Tensor};
 
-/// Most terms of one map (8 bytes each): what has more stays as the graph has it.
+/// The most terms of one map (8 bytes each). A chain with more is left as it is in the graph.
 const TERMS_MAX: usize = 1 << 22;
 
 /// Element `e`, row-major, is the sum over `e degree .. (e + 1) degree` of
@@ -16,7 +16,7 @@ pub(super) struct Terms {
 }
 
 impl Terms {
-    /// The source itself.
+    /// Each element is the source's element at the same place.
     pub(super) fn source(shape: &[usize]) -> Option<Self> {
         let len = u32::try_from(product(shape)?).ok()?;
         let index: Vec<_> = (0..len).collect();
@@ -24,7 +24,7 @@ impl Terms {
         Some(Self { shape: shape.into(), degree: 1, index, weight })
     }
 
-    /// Elements picked along `axis`, as ONNX' `Gather` does.
+    /// Picks elements along `axis`, as ONNX' `Gather` does.
     pub(super) fn gather(&self, axis: usize, picked: &[usize], indices: &[i64]) -> Option<Self> {
         let (before, len, after) = self.around(axis)?;
         let shape: TVec<usize> =
@@ -32,7 +32,7 @@ impl Terms {
         let mut terms = self.empty(shape, self.degree)?;
         for outer in 0..before {
             for &picks in indices {
-                // Negative ones count from the end.
+                // Negative indices count from the end.
                 let at =
                     usize::try_from(if picks < 0 { picks + len as i64 } else { picks }).ok()?;
                 if at >= len {
@@ -45,7 +45,7 @@ impl Terms {
         Some(terms)
     }
 
-    /// Elements times those of a constant, whose axes of length 1 are repeated.
+    /// Multiplies the elements by those of a constant, whose axes of length 1 are repeated.
     pub(super) fn scale(&self, factor: &Tensor) -> Option<Self> {
         let plain = factor.try_as_plain_ram().ok()?;
         let factors = plain.as_slice::<f32>().ok()?;
@@ -64,7 +64,7 @@ impl Terms {
         Some(terms)
     }
 
-    /// Sums along `axis`, which stays with length 1.
+    /// Sums along `axis`, which is kept with length 1.
     pub(super) fn sum(&self, axis: usize) -> Option<Self> {
         let (before, len, after) = self.around(axis)?;
         let mut shape = self.shape.clone();
@@ -87,7 +87,7 @@ impl Terms {
         same.then(|| Self { shape: shape.into(), ..self.clone() })
     }
 
-    /// Elements before, along and after an axis.
+    /// Numbers of elements before, along and after an axis: the products of these lengths.
     fn around(&self, axis: usize) -> Option<(usize, usize, usize)> {
         let len = *self.shape.get(axis)?;
         Some((product(&self.shape[..axis])?, len, product(&self.shape[axis + 1..])?))
@@ -106,13 +106,13 @@ impl Terms {
     }
 }
 
-/// Elements of a shape, if it is no larger than what a map may have terms.
+/// Number of elements of a shape; None if it is above [`TERMS_MAX`].
 fn product(shape: &[usize]) -> Option<usize> {
     let len = shape.iter().try_fold(1_usize, |len, &along| len.checked_mul(along))?;
     (len <= TERMS_MAX).then_some(len)
 }
 
-/// Place in a tensor of `of` of the value that element `element` of `shape` is given.
+/// The place, in a tensor of shape `of` that is broadcast to `shape`, of the value for `element`.
 fn repeated(element: usize, shape: &[usize], of: &[usize]) -> usize {
     let (mut rest, mut place, mut stride) = (element, 0, 1);
     for (&along, &of) in shape.iter().zip(of).rev() {
