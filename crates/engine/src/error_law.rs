@@ -314,7 +314,8 @@ mod tests {
             .collect()
     }
 
-    /// Pressure of Hertz: the mean is two thirds of the peak, its mean by its own weight more.
+    /// A pressure as Hertz has it: its mean is two thirds of its peak, and the mean weighted by
+    /// itself is greater.
     #[test]
     fn facts_of_a_ball_are_those_of_the_formulas() {
         let known = Look::of(&ball(1e4, [111.5, 111.5], 90.0)).statistics.cells;
@@ -388,7 +389,7 @@ mod tests {
         ] {
             assert!(laws.sed(network, way).is_none(), "{network} {way:?}");
         }
-        // A bound is above its median, whatever is fitted.
+        // A bound is above its median, whatever has been fitted.
         let mut facts = Facts::default();
         facts.set(Fact::Load, 1.0);
         let found = law.at(&facts);

@@ -180,7 +180,7 @@ mod tests {
         let backends = fallen.each_ref().map(|model| model.backend());
         assert_eq!(backends, [Backend::Ort, Backend::Tract, Backend::Tract]);
         assert!(check(states, fallen[1].as_ref(), 0.0).is_ok());
-        // What tract answers is not asked for here: `papilla-server check` and a reload do.
+        // Answers of tract are not compared here; `papilla-server check` and a reload compare them.
         assert!(check(states, fallen[2].as_ref(), 0.0).is_err());
     }
 }

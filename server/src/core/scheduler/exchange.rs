@@ -25,14 +25,14 @@ pub(crate) type Sessions = Vec<(usize, TierSession)>;
 /// A finger's new catalogue, and the sessions that are new with it.
 type Delivery = (Arc<Catalogue>, Sessions);
 
-/// What a thread renders a finger with.
+/// The catalogue and the engine sessions with which a thread renders one finger.
 pub(super) struct OfFinger {
     pub(super) catalogue: Arc<Catalogue>,
     /// One for each tier, in the catalogue's order.
     pub(super) sessions: Vec<TierSession>,
 }
 
-/// What waits for one thread.
+/// The deliveries that wait for one inference thread.
 #[derive(Default)]
 pub(crate) struct Inbox {
     /// Whether anything waits. Read before every job, so that the lock is taken only if something
@@ -83,7 +83,7 @@ impl Inbox {
     }
 }
 
-/// The way to all threads.
+/// The inboxes of all inference threads.
 pub(crate) struct Exchange {
     inboxes: Vec<Arc<Inbox>>,
 }
@@ -142,7 +142,8 @@ impl Exchange {
         Ok(all)
     }
 
-    /// Puts what [`prepare`](Self::prepare) made into the inboxes.
+    /// Puts a new catalogue, and the sessions that [`prepare`](Self::prepare) made, into the
+    /// inboxes.
     pub(crate) fn hand_over(&self, catalogue: &Arc<Catalogue>, sessions: Vec<Sessions>) {
         for (inbox, sessions) in self.inboxes.iter().zip(sessions) {
             inbox.put(catalogue, sessions);

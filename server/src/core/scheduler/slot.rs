@@ -39,7 +39,7 @@ impl Sink for mpsc::Sender<Done> {
     fn take_back(&self, _recycler: &mut Recycler) {}
 }
 
-/// What an offer came to.
+/// The result of [`Slot::offer`].
 #[derive(Debug)]
 pub(crate) enum Offer {
     /// The slot is in the queue or with a thread already. `replaced` is the job that waited in it,
@@ -52,7 +52,7 @@ pub(crate) enum Offer {
     Schedule,
 }
 
-/// The account of a session, or of one client's posts.
+/// The account of a session, or of one client's HTTP requests.
 pub(crate) type Account = account::Account<Slot>;
 
 /// Where one finger of a session, or one HTTP request, leaves its next frame for the pool.

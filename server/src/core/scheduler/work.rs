@@ -155,7 +155,8 @@ impl Worker {
         Progress { times, meta }: &mut Progress,
     ) -> Result<Outcome, Problem> {
         let start = Instant::now();
-        // Dropped before the network runs, so that the session gets the frame's memory back early.
+        // Taken out of the job, and dropped before the network runs, so that the session gets the
+        // frame's memory back early.
         let payload = mem::take(&mut job.payload);
         let options = &job.options;
         let mut effects = options.effects.as_ref().map(|e| lock(e));

@@ -18,7 +18,7 @@ fn read(name: &str) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// A shipped model as its graph stands, and by rows.
+/// A shipped model, run by its graph as it stands and by rows.
 struct Pair {
     plain: Box<dyn Session>,
     by_rows: Box<dyn Session>,
@@ -118,7 +118,7 @@ thread_local! {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
-    /// One session after another map, so that what a map leaves behind is seen too.
+    /// One session takes maps one after another, so that what a map leaves behind is noticed too.
     #[test]
     fn any_contact_is_answered_as_by_the_graph(
         patches in prop::collection::vec(Patch::any(), 0..5),

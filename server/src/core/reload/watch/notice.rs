@@ -164,7 +164,7 @@ mod tests {
         assert!(is_change(EventKind::Any));
     }
 
-    /// As on a file system that tells of nothing.
+    /// Behaves as on a file system that reports no changes.
     #[cfg(unix)]
     #[test]
     fn what_nobody_tells_is_found_by_the_next_look_and_told_once() {

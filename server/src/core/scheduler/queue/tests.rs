@@ -42,7 +42,7 @@ fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
-/// Held a thread for so long, all of it beside the network.
+/// A frame that held a thread for this time, none of it in the network.
 fn spent(busy: Duration) -> Spent {
     Spent { busy, beside_network: Some(busy) }
 }
@@ -62,7 +62,7 @@ fn show_light(queue: &Queue, client: &Client) {
     queue.done(turn, spent(ms(1)), false);
 }
 
-/// How many of `turns` turns of one thread each client gets, whose frames cost so much.
+/// How many of `turns` turns of one thread each client gets, if its frames cost as given.
 fn shared(turns: usize, clients: &[(Client, Duration)]) -> Vec<usize> {
     let queue = queue_of(1);
     clients.iter().for_each(|(client, _)| client.enter(&queue));
@@ -229,7 +229,7 @@ fn a_pause_earns_nothing_and_debts_are_forgotten_in_part() {
 }
 
 proptest! {
-    /// Whoever comes, whatever it costs: every slot that enters has one turn, and the queue ends
+    /// In any order of arrivals and costs, every slot that enters has one turn, and the queue ends
     /// empty.
     #[test]
     fn every_slot_that_enters_has_its_turn(
@@ -238,7 +238,7 @@ proptest! {
     ) {
         let queue = Queue::new(8, threads);
         let clients: Vec<_> = (0..5).map(|n| client(n % 3 + 1)).collect();
-        // A slot is in the queue or with a thread at most once, as `Slot` sees to it.
+        // `Slot` ensures that a slot is in the queue or with a thread at most once.
         let mut is_in = vec![[false; 3]; clients.len()];
         let (mut held, mut entered, mut turns) = (Vec::new(), 0, 0);
         let place = |turn: &Turn| {

@@ -21,11 +21,12 @@ pub(super) struct Gated {
 pub(super) struct Gate {
     /// Announces that an inference has begun.
     pub(super) begun: SyncSender<()>,
-    /// What the inference is to do.
+    /// Receives what the inference shall do.
     pub(super) go: Mutex<Receiver<Act>>,
 }
 
-/// A map without a greater pressure is rendered at once, Pa; that it begins is announced as well.
+/// A map whose pressures are no greater than this, Pa, is rendered at once. Its beginning is
+/// announced as well.
 pub(super) const FREE_PA: f32 = 0.5;
 
 pub(super) enum Act {
@@ -56,7 +57,7 @@ impl Session for GatedSession {
     fn infer(&mut self, pressure: &[f32], sed: &mut [f32]) -> Result<(), EngineError> {
         self.warm += 1;
         sed.copy_from_slice(pressure);
-        // The one run that warms a session is free.
+        // The run that warms a session up does not wait.
         if self.warm <= 1 {
             return Ok(());
         }

@@ -1,4 +1,5 @@
-//! Framing held against the library's: whatever it writes is read the same, in whatever portions.
+//! Compares the framing with that of tungstenite: what it writes is read the same, in portions of
+//! any size.
 
 use tokio_tungstenite::tungstenite::protocol::frame::{
     Frame, FrameHeader,
@@ -17,7 +18,7 @@ fn written(opcode: OpCode, is_last: bool, mask: [u8; 4], payload: &[u8]) -> Vec<
     bytes
 }
 
-/// What is understood of bytes that come in portions.
+/// What is read from bytes that arrive in portions.
 fn heard(inbound: &mut Inbound, bytes: &[u8], portion: usize) -> Result<Vec<Message>, Fault> {
     let mut messages = Vec::new();
     for part in bytes.chunks(portion) {
@@ -92,7 +93,7 @@ fn noise_ends_in_a_fault_or_in_silence_and_takes_little_memory() {
         let len = random.usize(..200);
         let mut bytes = noise(&mut random, len);
         if let [first, second, ..] = bytes.as_mut_slice() {
-            // Often enough a head that is right.
+            // Half of them get flag bits that a client's header may have.
             if random.bool() {
                 (*first, *second) = (*first & 0x8f, *second | 0x80);
             }
