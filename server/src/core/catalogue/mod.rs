@@ -273,8 +273,8 @@ impl Catalogue {
         self.predicted_latency_us(tier).min(best_us.saturating_add(self.overhead.us()))
     }
 
-    /// The greatest factor by which tiers that frames have used are slower than shipped; at least
-    /// 1.
+    /// The greatest factor, at least 1, by which tiers that frames have used are slower than
+    /// shipped.
     fn slowdown(&self) -> f64 {
         let used = self.tiers.iter().filter(|tier| tier.latency.is_used());
         used.map(|tier| tier.latency.slowdown()).fold(1.0, f64::max)
