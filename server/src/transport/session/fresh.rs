@@ -109,7 +109,8 @@ mod tests {
         assert_eq!(stale, [false, false, false, false, true]);
     }
 
-    /// Frames sent every 10 ms by a client whose clock is anything; held up by `delays_ms`.
+    /// Sends a frame every 10 ms, with a client's clock that begins at `clock_us` and delays of
+    /// `delays_ms`. Returns which were stale.
     fn stale(fresh: &mut Freshness, clock_us: u64, delays_ms: &[u64]) -> Vec<bool> {
         let begun = fresh.begun;
         let first = fresh.newest.map_or(0, |newest| newest + 1);
@@ -128,12 +129,12 @@ mod tests {
         for clock_us in [0, 1_700_000_000_000_000, i64::MAX as u64 - 25_000, u64::MAX - 5000] {
             let mut fresh = Freshness::new(Some(5000));
             let found = stale(&mut fresh, clock_us, &[3, 2, 4, 7, 8, 2]);
-            // Against 2 ms, the fastest: 7 is 5 later, 8 is 6 later.
+            // Against the fastest frame, with 2 ms: 7 ms is 5 ms later, 8 ms is 6 ms later.
             assert_eq!(found, [false, false, false, false, true, false], "{clock_us}");
         }
     }
 
-    /// A clock that ticks every 16.7 ms: frames at the end of a tick are none that were held up.
+    /// The clock ticks every 16.7 ms. Frames at the end of a tick must not count as delayed.
     #[test]
     fn the_end_of_a_coarse_tick_is_not_held_up() {
         let mut fresh = Freshness::new(Some(5000));
@@ -156,7 +157,8 @@ mod tests {
             let received = begun + Duration::from_micros(sent_us + sent_us / 10_000);
             assert!(!fresh.is_stale(n, sent_us, received), "after {n} s");
         }
-        // Set back by a second: stale at first, taken for what it is then.
+        // The clock is set back by a second. Frames are stale at first, until the new time is
+        // accepted.
         let received = |n: u32| begun + Duration::from_millis(3_600_500 + u64::from(n));
         let stale = (0..100)
             .filter(|&n| {

@@ -112,7 +112,7 @@ fn a_light_session_that_arrives_goes_ahead_of_all_that_wait() {
         let turn = pop(&queue).unwrap();
         queue.done(turn, spent(ms(400)), true);
     }
-    // It comes while a thread is busy with one more of the others' frames.
+    // The light session sends a frame while the thread is busy with another frame of the heavy one.
     let busy = pop(&queue).unwrap();
     light.enter(&queue);
     queue.done(busy, spent(ms(400)), true);
@@ -134,11 +134,11 @@ fn heavy_sessions_leave_a_thread_to_light_ones() {
         queue.done(turn, spent(ms(2)), false);
     }
     queue.done(first, spent(ms(3000)), true);
-    // The heavy ones go on, with one thread.
+    // The heavy sessions still have one thread.
     let next = pop(&queue).unwrap();
     assert!(heavy[1].owns(&next), "it has cost less");
     assert!(pop(&queue).is_none());
-    // The drain waits for nobody.
+    // Once the queue is closed, no thread is kept free.
     queue.close();
     assert!(pop(&queue).is_some());
 }
@@ -151,7 +151,7 @@ fn a_session_is_heavy_by_what_its_frames_take_beside_the_network() {
     other.enter(&queue);
     let held: Vec<_> = (0..2).map(|_| pop(&queue).unwrap()).collect();
     for turn in held {
-        // A slow network is the operator's choice.
+        // Time in the network does not count, since the operator chooses the networks.
         queue.done(turn, Spent { busy: ms(500), beside_network: Some(ms(1)) }, true);
     }
     let held: Vec<_> = (0..2).map(|_| pop(&queue).unwrap()).collect();
@@ -189,7 +189,7 @@ fn heavy_sessions_have_all_threads_where_no_light_one_is_about() {
     let (queue, heavy) = (queue_of(3), client(10));
     heavy.enter(&queue);
     assert_eq!((0..3).filter(|_| pop(&queue).is_some()).count(), 3);
-    // And the only thread, which cannot be kept free.
+    // With one thread there is none to keep free.
     let (queue, light, heavy) = (queue_of(1), client(1), client(10));
     show_light(&queue, &light);
     heavy.enter(&queue);
@@ -205,7 +205,7 @@ fn a_pause_earns_nothing_and_debts_are_forgotten_in_part() {
         let turn = pop(&queue).unwrap();
         queue.done(turn, spent(ms(5)), true);
     }
-    // Both want all there is from now on: the one that paused has no more than half.
+    // From now on both want all the thread time. The one that paused gets no more than half.
     idle.enter(&queue);
     let mut counts = [0_usize; 2];
     for _ in 0..100 {
@@ -214,7 +214,7 @@ fn a_pause_earns_nothing_and_debts_are_forgotten_in_part() {
         queue.done(turn, spent(ms(5)), true);
     }
     assert!(counts[0].abs_diff(counts[1]) <= 2, "{counts:?}");
-    // An hour of thread time, paid once with a second.
+    // A frame that costs an hour of thread time leaves, after a pause, one second of debt.
     let turn = pop(&queue).unwrap();
     let debtor = if idle.owns(&turn) { &idle } else { &busy };
     queue.done(turn, spent(Duration::from_secs(3600)), false);

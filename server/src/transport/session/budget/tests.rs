@@ -1,4 +1,4 @@
-//! Machines that are slower than was said, become slower, and recover.
+//! Budgets on machines that are slower than the shipped times say, become slower, and recover.
 
 use papilla_engine::Backend;
 
@@ -10,7 +10,7 @@ const TIERS: [(f64, u64); 4] = [(0.07, 200), (0.03, 1400), (0.026, 4800), (0.025
 const BUDGET_US: u32 = 11_000;
 const FRAME: Duration = Duration::from_millis(11);
 
-/// A session at 90 Hz on a machine that takes `slower` times what was shipped.
+/// A session at 90 Hz on a machine whose times are `slower` times the shipped ones.
 struct Simulated {
     catalogue: Catalogue,
     budget: Budget,
@@ -32,7 +32,7 @@ impl Simulated {
         Self { catalogue, budget, counts: FrameCounts::default(), tier, now: Instant::now() }
     }
 
-    /// One frame; whether it was late.
+    /// Sends one frame. Returns whether it was late.
     fn frame(&mut self, slower: f64) -> bool {
         self.now += FRAME;
         let next = self.budget.next(&self.catalogue, self.tier, &self.counts, self.now);
@@ -48,21 +48,21 @@ impl Simulated {
         is_late
     }
 
-    /// How many of so many frames were late.
+    /// Sends this many frames. Returns how many were late.
     fn late(&mut self, frames: usize, slower: f64) -> usize {
         (0..frames).filter(|_| self.frame(slower)).count()
     }
 }
 
-/// The calibration was skipped, and this machine takes five times as long: 47 ms for the tier that
-/// was chosen, 24 for the next.
+/// The calibration was skipped, and this machine is five times slower than shipped: 47 ms for the
+/// tier that was chosen, 24 ms for the next.
 #[test]
 fn a_tier_that_answers_nothing_lasts_ten_frames() {
     let mut session = Simulated::new();
     assert_eq!(session.tier, 3, "by the shipped times");
     assert!(session.late(60, 5.0) <= 10);
     assert_eq!(session.tier, 1, "7 ms: the most accurate that fits, without a stop between");
-    // What is known now counts for the next session too.
+    // The next session profits from what was measured.
     assert_eq!(session.catalogue.choose(Some(BUDGET_US), &[]), Some(1));
 }
 
@@ -77,7 +77,8 @@ fn a_session_goes_up_again_when_the_machine_recovers() {
     assert_eq!(session.tier, 2, "9.4 ms and what is added leave no fifth of 11 ms");
 }
 
-/// At four times the shipped times the fastest run of before promises more than there is.
+/// The machine becomes four times slower. By its fastest run of before, a more accurate tier seems
+/// to fit the budget, but it does not.
 #[test]
 fn tries_become_rare_where_they_fail() {
     let mut session = Simulated::new();
@@ -96,7 +97,7 @@ fn the_fastest_tier_stays_however_late() {
     assert_eq!(session.tier, 2);
 }
 
-/// A frame that comes late now and then is no reason to go down.
+/// Single late frames do not change the tier.
 #[test]
 fn a_hiccup_changes_nothing() {
     let mut session = Simulated::new();
