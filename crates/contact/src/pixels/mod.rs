@@ -55,7 +55,6 @@ use crate::error::ContactError;
 use crate::force_target::{NetForce, Search};
 use crate::model::ContactModel;
 use crate::object::Object;
-use crate::objects::View;
 use crate::second_order::Amplitudes;
 use crate::solver::{Solver, Until};
 use convolution::Convolution;
@@ -73,9 +72,6 @@ pub use spacing::PixelSpacing;
 /// Change of the vertices' displacement that ends what they find by themselves, reference mm: pixels
 /// only go on by its change from frame to frame.
 const AT_VERTICES_MM: f32 = 5e-4;
-/// Most linearisations at vertices in a frame that starts from the last one. Under blades they go to and
-/// fro and never settle; pixels need no more than their mean.
-const AT_VERTICES_MAX: u32 = 8;
 /// Change of the forces without pixels, of their sum, up to which the last frame is a start.
 const JUMP: f32 = 0.5;
 /// Pixels settle to a hundredth of the force: [`rounds`].
@@ -125,7 +121,7 @@ impl Solver {
     ) -> Result<(), ContactError> {
         self.within(objects.into(), 0.0, |solver, view| {
             (solver.sides.toward, solver.sides.fine) = (None, true);
-            solver.frame_until(pixels.at_vertices(view), view, out)?;
+            solver.frame_until(Until::within(AT_VERTICES_MM), view, out)?;
             pixels.refine(solver, solver.held(view), out)?;
             solver.end_frame(view, out);
             Ok(())
@@ -156,7 +152,7 @@ impl Solver {
             }
             let taken = (&mut effort, &mut *out);
             let travel = solver.travel_until(view, net, PIXELS, taken, |solver, view, out| {
-                solver.frame_until(pixels.at_vertices(view), view, out)?;
+                solver.frame_until(Until::within(AT_VERTICES_MM), view, out)?;
                 pixels.refine(solver, solver.held(view), out)
             })?;
             solver.follow_slip(view);
@@ -192,13 +188,6 @@ impl PixelContact {
     #[must_use]
     pub fn map_pa(&self) -> &[f32] {
         &self.map_pa
-    }
-
-    /// When vertices have found enough by themselves. Where they slip is found by them alone.
-    fn at_vertices(&self, view: View<'_>) -> Until {
-        let all = Until::within(AT_VERTICES_MM);
-        let is_few = self.turns.is_warm() && !view.is_rough();
-        if is_few { Until { iterations_max: AT_VERTICES_MAX, ..all } } else { all }
     }
 
     /// Greatest pressure of the last frame, Pa.
