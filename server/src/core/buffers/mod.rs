@@ -45,16 +45,19 @@ impl<const N: usize> Recycler<N> {
         self.buffers.iter_mut().any(|buffer| buffer.try_reclaim(1))
     }
 
+    /// Turns to a buffer that nobody holds and that has room for `bytes`, if there is one.
+    fn turn_to_free(&mut self, bytes: usize) -> bool {
+        let free = (0..N)
+            .map(|turn| (self.next + turn) % N)
+            .find(|&index| self.buffers[index].try_reclaim(bytes));
+        self.next = free.unwrap_or(self.next);
+        free.is_some()
+    }
+
     /// An empty buffer with room for `bytes`. It allocates only if no buffer is both returned and
     /// large enough.
     pub(crate) fn claim(&mut self, bytes: usize) -> &mut BytesMut {
-        for turn in 0..N {
-            let index = (self.next + turn) % N;
-            if self.buffers[index].try_reclaim(bytes) {
-                self.next = index;
-                break;
-            }
-        }
+        self.turn_to_free(bytes);
         let index = self.next;
         self.next = (self.next + 1) % N;
         let buffer = &mut self.buffers[index];

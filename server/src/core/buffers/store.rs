@@ -9,13 +9,51 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
+use bytes::BytesMut;
 use papilla_proto::{HEADER_LEN, MAP_LEN};
 
 use super::{HEADROOM, Recycler};
 
-/// Buffers of incoming frames. Four: one is read into, one is with an inference thread, one waits
-/// in the slot, and one was just replaced there.
-pub(crate) type Frames = Recycler<4>;
+/// Buffers of one ring of [`Frames`].
+const RING: usize = 4;
+
+/// Buffers of the incoming frames of one session. For each finger one is with an inference thread
+/// and one waits in the finger's slot. Besides, one is read into, and one was just replaced in a
+/// slot.
+#[derive(Debug)]
+pub(crate) struct Frames {
+    rings: Vec<Recycler<RING>>,
+}
+
+impl Default for Frames {
+    /// Buffers for one finger.
+    fn default() -> Self {
+        Self { rings: vec![Recycler::default()] }
+    }
+}
+
+impl Frames {
+    /// Has buffers for so many fingers.
+    fn resize(&mut self, fingers: usize) {
+        let rings = (2 * fingers.max(1) + 2).div_ceil(RING);
+        self.rings.resize_with(rings, Recycler::default);
+    }
+
+    fn make_room(&mut self, bytes: usize) {
+        self.rings.iter_mut().for_each(|ring| ring.make_room(bytes));
+    }
+
+    fn has_room(&mut self) -> bool {
+        self.rings.iter_mut().any(Recycler::has_room)
+    }
+
+    /// Hands out an empty buffer with room for `bytes`. It comes back when it is dropped. Memory is
+    /// allocated only if no buffer is both returned and large enough.
+    pub(crate) fn lend(&mut self, bytes: usize) -> BytesMut {
+        let free = self.rings.iter_mut().position(|ring| ring.turn_to_free(bytes));
+        self.rings[free.unwrap_or(0)].lend(bytes)
+    }
+}
 
 /// Buffers of answers.
 pub(crate) type Answers = Recycler;
@@ -49,11 +87,17 @@ impl Store {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Buffers for frames of at most `bytes`.
-    pub(crate) fn frames(&self, bytes: usize) -> Frames {
+    /// Buffers for frames of at most `bytes` for so many fingers.
+    pub(crate) fn frames(&self, bytes: usize, fingers: usize) -> Frames {
         let mut frames = self.kept().frames.pop().unwrap_or_default();
-        frames.make_room(bytes.max(ROOM));
+        self.enlarge_frames(&mut frames, bytes, fingers);
         frames
+    }
+
+    /// Changes a session's buffers to so many fingers.
+    pub(crate) fn enlarge_frames(&self, frames: &mut Frames, bytes: usize, fingers: usize) {
+        frames.resize(fingers);
+        frames.make_room(bytes.max(ROOM));
     }
 
     /// Buffers for answers of at most `bytes`.
@@ -65,19 +109,20 @@ impl Store {
 
     /// Takes the buffers of a closed session back.
     pub(crate) fn keep_frames(&self, frames: &mut Frames) {
-        keep(&mut self.kept().frames, frames, self.places);
+        // Buffers without capacity come from a session that failed before it used them.
+        let mut kept = self.kept();
+        if frames.has_room() && kept.frames.len() < self.places {
+            frames.resize(1);
+            kept.frames.push(mem::take(frames));
+        }
     }
 
     /// Takes the buffers of a closed session back.
     pub(crate) fn keep_answers(&self, answers: &mut Answers) {
-        keep(&mut self.kept().answers, answers, self.places);
-    }
-}
-
-fn keep<const N: usize>(kept: &mut Vec<Recycler<N>>, back: &mut Recycler<N>, places: usize) {
-    // Buffers without capacity come from a session that failed before it used them.
-    if back.has_room() && kept.len() < places {
-        kept.push(mem::take(back));
+        let mut kept = self.kept();
+        if answers.has_room() && kept.answers.len() < self.places {
+            kept.answers.push(mem::take(answers));
+        }
     }
 }
 
@@ -90,7 +135,7 @@ mod tests {
     /// Where the buffers of `sessions` lie that are open at the same time.
     fn places(store: &Store, sessions: usize) -> HashSet<usize> {
         let mut open: Vec<_> =
-            (0..sessions).map(|_| (store.frames(100), store.answers(300_000))).collect();
+            (0..sessions).map(|_| (store.frames(100, 1), store.answers(300_000))).collect();
         let mut places = HashSet::new();
         for (frames, answers) in &mut open {
             places.extend((0..4).map(|_| frames.lend(100).as_ptr() as usize));
@@ -111,6 +156,25 @@ mod tests {
         for sessions in [1, 5, 3, 5] {
             assert!(places(&store, sessions).is_subset(&first), "{sessions} sessions");
         }
+    }
+
+    /// Each of ten fingers may have a frame with a thread and one that waits.
+    #[test]
+    fn frames_of_ten_fingers_that_wait_need_no_more_memory() {
+        let store = Store::new(1);
+        let mut frames = store.frames(100, 10);
+        let mut places = HashSet::new();
+        for _ in 0..5 {
+            let held: Vec<_> = (0..22).map(|_| frames.lend(100)).collect();
+            places.extend(held.iter().map(|buffer| buffer.as_ptr() as usize));
+        }
+        assert!(places.len() <= 24, "{} places for 22 buffers", places.len());
+        // A session of one finger gets no more than it needs.
+        store.keep_frames(&mut frames);
+        let mut frames = store.frames(100, 1);
+        let held: HashSet<_> = (0..4).map(|_| frames.lend(100).as_ptr() as usize).collect();
+        assert!(held.is_subset(&places));
+        assert_eq!(frames.rings.len(), 1);
     }
 
     #[test]

@@ -149,6 +149,7 @@ impl Session {
             Ok((terms, ready)) => {
                 self.terms = terms;
                 self.open_lanes(connection);
+                connection.inbound.expect_fingers(self.lanes.len(), &connection.app.store);
                 if !*connection.app.drain.borrow() {
                     self.set_stay(connection);
                 }

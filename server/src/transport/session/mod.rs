@@ -112,9 +112,9 @@ async fn converse(connection: &mut Connection, number: u64) -> End {
         Ok(terms) => terms,
         Err(end) => return end,
     };
-    connection
-        .inbound
-        .expect(HEADER_LEN + MAP_LEN * terms.sample_type.bytes(), &connection.app.store);
+    let frame_len = HEADER_LEN + MAP_LEN * terms.sample_type.bytes();
+    let fingers = terms.hand.fingers().len();
+    connection.inbound.expect(frame_len, fingers, &connection.app.store);
     let session = frames::Session::new(number, terms, connection);
     frames::serve(connection, session).await
 }

@@ -8,13 +8,15 @@ use std::{
 };
 
 use bytes::Bytes;
+use papilla_proto::contact::FINGERS_MAX;
 use tokio::{net::TcpStream, sync::Notify};
 
 use crate::transport::room;
 
 /// Capacity for messages that the system's buffer has no room for. While one is left the task reads
-/// nothing, so only its own last messages and answers to accepted frames can follow.
-const LEFT: usize = 8;
+/// nothing, so only its own last messages can follow, and answers to accepted frames: two of each
+/// finger.
+const LEFT: usize = 8 + 2 * FINGERS_MAX;
 
 /// What a session sends through. Whole messages go in, and they leave in that order.
 ///

@@ -138,12 +138,17 @@ impl Inbound {
         Self { buffer: BytesMut::from(read), ..Self::default() }
     }
 
-    /// Takes memory for frames of `frame_len` bytes, once for the whole session.
-    pub(super) fn expect(&mut self, frame_len: usize, store: &Store) {
+    /// Takes memory for frames of `frame_len` bytes of so many fingers, once for the whole session.
+    pub(super) fn expect(&mut self, frame_len: usize, fingers: usize, store: &Store) {
         self.room = HEAD_MAX + frame_len;
-        self.spare = store.frames(self.room);
+        self.spare = store.frames(self.room, fingers);
         let read = mem::take(&mut self.buffer);
         self.renew(&read[self.taken..]);
+    }
+
+    /// Takes memory for frames of another number of fingers.
+    pub(super) fn expect_fingers(&mut self, fingers: usize, store: &Store) {
+        store.enlarge_frames(&mut self.spare, self.room, fingers);
     }
 
     /// Changes to a free buffer that begins with `read`.
