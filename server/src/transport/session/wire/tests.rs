@@ -62,7 +62,7 @@ fn what_the_library_writes_is_read_in_any_portions() {
         }
         let (early, late) = bytes.split_at(bytes.len() / 2);
         let mut found = heard(&mut inbound, early, portion).unwrap();
-        inbound.expect(1000, &Store::new(1));
+        inbound.expect(1000, 1, &Store::new(1));
         found.extend(heard(&mut inbound, late, portion).unwrap());
         assert!(found == due, "in portions of {portion}");
         assert!(!inbound.is_amid());
@@ -72,7 +72,7 @@ fn what_the_library_writes_is_read_in_any_portions() {
 #[test]
 fn frames_of_a_session_use_the_same_memory_again() {
     let mut inbound = Inbound::new(&[]);
-    inbound.expect(1000, &Store::new(1));
+    inbound.expect(1000, 1, &Store::new(1));
     let mut places = std::collections::HashSet::new();
     for n in 0..50_u8 {
         let frame = written(OpCode::Data(Data::Binary), true, [n; 4], &[n; 1000]);
