@@ -11,6 +11,7 @@ mod index;
 mod ladder;
 mod options;
 mod patterns;
+mod pseudo_labels;
 
 use clap::{Parser, Subcommand};
 use papilla_engine::{Backend, Card, Model};
@@ -138,6 +139,13 @@ enum Command {
     /// with the same SED where contact's pressure is a little off.
     #[command(name = "contact-maps", after_long_help = EXIT_CODES)]
     ContactMaps(contact_maps::Options),
+    /// Write what a network answers to pressures that no simulation has solved.
+    ///
+    /// Indentations are drawn as a campaign draws them, with other seeds. Contact on pixels finds
+    /// their pressure, the network answers with SED. Another network learns these pairs beside
+    /// simulated ones (`papilla_trainer train --pseudo-labels`).
+    #[command(name = "pseudo-labels", after_long_help = EXIT_CODES)]
+    PseudoLabels(pseudo_labels::Options),
     /// Load one model and say what that took, as JSON; the ladder runs it in a fresh process.
     #[command(hide = true)]
     Footprint {
@@ -161,6 +169,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Contact(options) => contact::run(options, json),
         Command::Friction(options) => friction::run(options, json),
         Command::ContactMaps(options) => contact_maps::run(options, json),
+        Command::PseudoLabels(options) => pseudo_labels::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }
 }

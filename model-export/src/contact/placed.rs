@@ -4,6 +4,7 @@ use crate::ExportError;
 use crate::dataset::Dataset;
 use papilla_contact::Object;
 use papilla_dataset::{IndentationEntry, Shard};
+use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::scene::Pose;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_proto::atlas::Patch;
@@ -34,14 +35,19 @@ impl Placed {
         let pose = Pose { pitch_deg, roll_deg, yaw_deg };
         let straight = Approach::straight(spec, pose).map_err(|error| bad(error.to_string()))?;
         let approach = Approach { offset_mm: indentation.offset_mm, ..straight };
-        let touch = if shard.cells.is_some() {
-            let contact = approach.contact_with(dataset.shape()?, &Drive::Depths(vec![]));
-            contact.map(|contact| (contact.start, contact.direction))
-        } else {
-            on_vertices(dataset, spec, &approach)
-        };
+        if shard.cells.is_some() {
+            return Ok(Self::on_skin(approach, dataset.shape()?));
+        }
+        let touch = on_vertices(dataset, spec, &approach);
         let shape = approach.shape;
         Ok(touch.map(|(first_touch, direction)| Self { shape, first_touch, direction }))
+    }
+
+    /// Where it first touches the skin of a finger of this shape. `None` if it passes the finger.
+    pub(super) fn on_skin(approach: Approach, finger: &FingertipShape) -> Option<Self> {
+        let touch = approach.contact_with(finger, &Drive::Depths(vec![]))?;
+        let (first_touch, direction) = (touch.start, touch.direction);
+        Some(Self { shape: approach.shape, first_touch, direction })
     }
 
     /// Its way in, a unit vector.

@@ -230,6 +230,21 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "(networks on maps; again for each dataset)",
     )
     add(
+        "--pseudo-labels",
+        action="append",
+        default=[],
+        metavar="FILE.npz",
+        help="learn these pairs too, which `model-export pseudo-labels` writes: what another "
+        "network answers to pressures that were not simulated (networks on maps; may be given "
+        "again)",
+    )
+    add(
+        "--pseudo-samples",
+        type=int,
+        metavar="N",
+        help="see N of these pairs an epoch, drawn anew each time (all)",
+    )
+    add(
         "--train-presses",
         type=int,
         metavar="N",

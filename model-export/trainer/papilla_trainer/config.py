@@ -44,12 +44,20 @@ class TrainConfig:
     contact: list[str] = field(default_factory=list)
     # Name and hash of the model whose weights are the first; none: random ones.
     start: dict[str, str] | None = None
+    pseudo_labels: list[str] = field(default_factory=list)
+    pseudo_samples: int | None = None
 
     def __post_init__(self) -> None:
         if self.shift_px and not isinstance(self.spec, MapSpec):
             raise UsageError("--shift-px is for networks on maps (map-...) alone")
         if self.contact and not isinstance(self.spec, MapSpec):
             raise UsageError("--contact is for networks on maps (map-...) alone")
+        if self.pseudo_labels and not isinstance(self.spec, MapSpec):
+            raise UsageError("--pseudo-labels is for networks on maps (map-...) alone")
+        if self.pseudo_samples is not None and (self.pseudo_samples < 1 or not self.pseudo_labels):
+            raise UsageError(
+                f"--pseudo-samples {self.pseudo_samples}: at least 1, with --pseudo-labels"
+            )
         if not 0 <= self.shift_px <= LARGEST_SHIFT_PX:
             raise UsageError(
                 f"--shift-px must lie between 0 and {LARGEST_SHIFT_PX}, not {self.shift_px}: "

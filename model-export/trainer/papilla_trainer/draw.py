@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import torch
 from torch import Tensor
 
+Most = int | None | Mapping[int, int | None]
+"""How many samples of a source an epoch sees at most: of each the same, or by source; None: all."""
 
-def drawn(source: Tensor, most: int | None) -> int:
+
+def drawn(source: Tensor, most: Most) -> int:
     """How many samples `draw` returns."""
-    counts = source.unique(return_counts=True)[1]
-    return int((counts if most is None else counts.clamp(max=most)).sum())
+    sources, counts = source.unique(return_counts=True)
+    pairs = zip(sources.tolist(), counts.tolist(), strict=True)
+    return sum(count if (m := _most(most, one)) is None else min(count, m) for one, count in pairs)
 
 
-def draw(source: Tensor, most: int | None, generator: torch.Generator) -> Tensor:
-    """Samples in an order by chance, of each source ``most`` at most (None: all).
+def draw(source: Tensor, most: Most, generator: torch.Generator) -> Tensor:
+    """Samples in an order by chance, of each source ``most`` at most.
 
     ``source`` is ``[N]``: which one each sample is of. A campaign of a thousand plates would else
     count for several times what a few hundred presses of many shapes do.
@@ -22,5 +28,11 @@ def draw(source: Tensor, most: int | None, generator: torch.Generator) -> Tensor
     if most is None:
         return order
     of = source[order]
-    places = [torch.nonzero(of == one).flatten()[:most] for one in source.unique()]
+    places = [
+        torch.nonzero(of == one).flatten()[: _most(most, one)] for one in source.unique().tolist()
+    ]
     return order[torch.cat(places).sort().values]
+
+
+def _most(most: Most, source: int) -> int | None:
+    return most.get(source) if isinstance(most, Mapping) else most

@@ -16,6 +16,10 @@ from papilla_trainer.dataset import Dataset, State
 from papilla_trainer.joined import STRIDE
 from papilla_trainer.losses import Loss, make_loss
 from papilla_trainer.map_network import MapNet, MapSpec
+from papilla_trainer.pseudo_labels import pseudo_states
+
+# Where pseudo-labels come from, as ``Samples.source`` has it.
+PSEUDO = -1
 
 
 class Samples:
@@ -23,7 +27,8 @@ class Samples:
 
     On a CPU they stay where they are on disk, mapped into memory; another device gets all of them
     at once. The U-Net's are divided by the dataset's maxima, as in its paper. ``source`` ``[N]``
-    says which dataset each is of; with contact's pressure it counts as another.
+    says which dataset each is of; with contact's pressure it counts as another, and pseudo-labels
+    are of :data:`PSEUDO`.
     """
 
     def __init__(
@@ -50,6 +55,13 @@ class Samples:
         inputs, targets = self._held
         chosen = chosen.to(inputs.device)
         return inputs[chosen], targets[chosen]
+
+    def most(self, config: TrainConfig) -> dict[int, int | None]:
+        """How many samples of each source an epoch sees."""
+        most = dict.fromkeys(self.source.unique().tolist(), config.dataset_samples)
+        if PSEUDO in most:
+            most[PSEUDO] = config.pseudo_samples
+        return most
 
     def _read(self, rows: Iterable[int]) -> tuple[Tensor, Tensor]:
         states = [self._states[row] for row in rows]
@@ -83,8 +95,11 @@ def make_task(
     if isinstance(spec, NetworkSpec):
         units = (dataset.pressure_max_pa, dataset.sed_max_j_per_m3)
     states = dataset.states(fit_ids)
-    fit = Samples(with_contact(states, dataset, config.contact), device, units)
-    fit.source[len(states) :] += len(dataset.hashes)
+    simulated = with_contact(states, dataset, config.contact)
+    pseudo = pseudo_states(config.pseudo_labels, dataset)
+    fit = Samples(simulated + pseudo, device, units)
+    fit.source[len(states) : len(simulated)] += len(dataset.hashes)
+    fit.source[len(simulated) :] = PSEUDO
     aside = dataset.states(validation_ids)
     validation = Samples(aside, device, units) if aside else None
     network = fresh_network(spec, config.seed).to(memory_format=torch.channels_last)

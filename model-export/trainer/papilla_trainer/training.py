@@ -70,7 +70,8 @@ class Trainer:
         if start is not None:
             start.give(self.network, config.network)
         self.fit_samples, self.validation = task.fit, task.validation
-        self.epoch_samples = drawn(task.fit.source, config.dataset_samples)
+        self.most = task.fit.most(config)
+        self.epoch_samples = drawn(task.fit.source, self.most)
         self.on_pixels = isinstance(self.network, MapNet)
         self.optimizer = torch.optim.Adam(
             self.network.parameters(), lr=config.learning_rate, fused=True
@@ -148,7 +149,7 @@ class Trainer:
         return mean
 
     def _batches(self, generator: torch.Generator) -> tuple[Tensor, ...]:
-        order = draw(self.fit_samples.source, self.config.dataset_samples, generator)
+        order = draw(self.fit_samples.source, self.most, generator)
         return order.split(self.config.batch)
 
     def _forward(self, inputs: Tensor) -> Tensor:
