@@ -7,7 +7,8 @@ use ndarray::{Array1, Array3, s};
 use ndarray_npy::NpzReader;
 use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::MAP_LEN;
-use papilla_model_export::contact::{ContactMaps, Models};
+use papilla_fingertip::campaign::CampaignSpec;
+use papilla_model_export::contact::{ContactMaps, Labeller, Models, PseudoLabels, read_atlas};
 use papilla_model_export::dataset::Dataset;
 use std::io::Cursor;
 use std::path::Path;
@@ -48,4 +49,45 @@ fn every_state_of_the_reference_has_a_pressure_close_to_its_own() {
         // Springs are 47 % off (docs/reports/contact.md), another press' map more than 100.
         assert!(off < 0.3, "press {}: {off}", press[row]);
     }
+}
+
+/// A campaign's indentations are those of the dataset that was made of it, so contact finds the same
+/// pressure for both; what a network answers to it is the label.
+#[test]
+fn a_campaign_is_labelled_without_its_simulations() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let models = Models::read(&root.join("models/finger.contact")).unwrap();
+    let atlas_path = root.join("models/atlas.json");
+    let atlas = read_atlas(&atlas_path).unwrap();
+    let path = root.join("models/half-space.onnx");
+    let network = papilla_engine::load(&std::fs::read(&path).unwrap(), None).unwrap();
+    let mut spec = CampaignSpec::read(&root.join("campaigns/final.toml")).unwrap();
+    spec.presses = 2;
+    let mut labels = PseudoLabels::default();
+    let session = network.session().unwrap();
+    let mut labeller = Labeller::new(&models, (&atlas_path, &atlas), session, &path).unwrap();
+    let mut done = 0;
+    labeller.label(&spec, &mut labels, || done += 1).unwrap();
+    assert_eq!(done, 2);
+    assert!(labels.len() >= 2, "{} of {}", labels.len(), labels.left_out);
+
+    let dataset = Dataset::open(&root.join("data/final")).unwrap();
+    let maps = ContactMaps::of(&models, &dataset).unwrap();
+    let first = maps.press.iter().position(|press| *press == 0).unwrap() * MAP_LEN;
+    assert_eq!(labels.pressure_pa[..MAP_LEN], maps.pressure_pa[first..first + MAP_LEN]);
+    let mut sed = vec![0.0; MAP_LEN];
+    let mut session = network.session().unwrap();
+    for (pressure, label) in
+        labels.pressure_pa.chunks(MAP_LEN).zip(labels.sed_j_per_m3.chunks(MAP_LEN))
+    {
+        session.infer(pressure, &mut sed).unwrap();
+        assert!(sed == label && label.iter().any(|sed| *sed > 0.0));
+    }
+
+    let bytes = labels.npz(atlas.hash(), &network.info().name).unwrap();
+    let mut npz = NpzReader::new(Cursor::new(bytes)).unwrap();
+    let hash: Array1<u8> = npz.by_name("atlas_hash").unwrap();
+    let read: Array3<f32> = npz.by_name("sed_j_per_m3").unwrap();
+    assert_eq!(hash.as_slice().unwrap(), atlas.hash().as_bytes());
+    assert_eq!(read.as_slice().unwrap(), labels.sed_j_per_m3);
 }
