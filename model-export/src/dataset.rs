@@ -88,10 +88,12 @@ impl Dataset {
             Some(due) if due == found => {}
             None if found == Finger::usual().sha256() => {}
             _ => {
-                let due = due.unwrap_or("the default finger's");
+                let solved = due.map_or_else(
+                    || "the default finger".to_owned(),
+                    |due| format!("a finger whose hash is {due}"),
+                );
                 return Err(refused(format!(
-                    "its dimensions and tissues have the hash {found}, and {} was solved on a \
-                     finger with {due}",
+                    "the hash of its dimensions and tissues is {found}, but {} was solved on {solved}",
                     self.folder().display()
                 )));
             }
