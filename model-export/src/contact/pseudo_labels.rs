@@ -109,7 +109,7 @@ impl<'a> Labeller<'a> {
             };
             let straight = Approach::straight(indenter, indentation.pose).map_err(bad)?;
             let approach = Approach { offset_mm: indentation.offset_mm, ..straight };
-            self.label_one(&indentation, Placed::on_skin(approach, &spec.shape), labels)?;
+            self.label_one(&indentation, Placed::on_skin(approach, &spec.shape).as_ref(), labels)?;
             done();
         }
         Ok(())
@@ -118,11 +118,11 @@ impl<'a> Labeller<'a> {
     fn label_one(
         &mut self,
         indentation: &Indentation,
-        placed: Option<Placed>,
+        placed: Option<&Placed>,
         labels: &mut PseudoLabels,
     ) -> Result<(), ExportError> {
         for (depth_mm, slide_mm) in indentation.states() {
-            let object = placed.as_ref().map(|placed| placed.at(depth_mm, slide_mm));
+            let object = placed.map(|placed| placed.at(depth_mm, slide_mm));
             self.solver.reset();
             self.pixels.reset();
             let solved = object.is_some_and(|object| {
