@@ -156,6 +156,13 @@ impl Card {
         self.training.get("contact").is_some()
     }
 
+    /// Hash of dimensions and tissues of the finger whose simulations trained it; None: the default
+    /// finger, or no simulations at all.
+    #[must_use]
+    pub fn finger_sha256(&self) -> Option<&str> {
+        self.training.get("finger_sha256")?.as_str()
+    }
+
     fn require_format(&self) -> Result<(), EngineError> {
         if self.format == MODEL_FORMAT {
             return Ok(());

@@ -32,6 +32,8 @@ class Served:
     dataset_sha256: str
     # The hashes of several datasets that were trained on together.
     datasets: list[str] = field(default_factory=list)
+    # Hash of dimensions and tissues of the finger; None: the default one.
+    finger_sha256: str | None = None
 
     @staticmethod
     def of(dataset: Dataset) -> Served:
@@ -44,6 +46,7 @@ class Served:
             effects=list(dataset.effects),
             dataset_sha256=dataset.dataset_sha256,
             datasets=dataset.hashes,
+            finger_sha256=dataset.finger_sha256,
         )
 
 

@@ -77,6 +77,8 @@ class Dataset:
         try:
             self.atlas_hash = str(manifest["atlas_hash"])
             self.effects = [str(effect) for effect in manifest["effects"]]
+            # None: the default finger.
+            self.finger_sha256: str | None = manifest["campaign"].get("finger_sha256")
             self.vertex_count = int(manifest["vertex_count"])
             self.pressure_max_pa = _positive(manifest, "pressure_max_pa")
             self.sed_max_j_per_m3 = _positive(manifest, "sed_max_j_per_m3")

@@ -154,6 +154,8 @@ def properties(
     """``metadata_props`` of any model, trained or not."""
     if len(served.datasets) > 1:
         training = {**training, "datasets": served.datasets}
+    if served.finger_sha256 is not None:
+        training = {**training, "finger_sha256": served.finger_sha256}
     return {
         "papilla.format": "1",
         "papilla.name": name,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -8,11 +9,14 @@ import onnx
 import onnxruntime
 import pytest
 import torch
+from tiny_dataset import write_tiny_dataset
 
 from papilla_trainer.check import check_model
-from papilla_trainer.checkpoint import Checkpoint
+from papilla_trainer.checkpoint import Checkpoint, Served
 from papilla_trainer.dataset import Dataset
-from papilla_trainer.export import export_run
+from papilla_trainer.errors import DatasetError
+from papilla_trainer.export import export_run, properties
+from papilla_trainer.joined import JoinedDataset
 from papilla_trainer.serving import predict, served_model
 
 
@@ -108,3 +112,23 @@ def test_check_finds_what_is_wrong(
     graph.graph.node[-1].op_type = "Div"
     onnx.save(graph, str(tmp_path / "operator.onnx"))
     assert "Div" in check_model(tmp_path / "operator.onnx", tiny, [], None).failures[0]
+
+
+def test_a_network_says_whose_finger_it_learnt(finished: Checkpoint, tmp_path: Path) -> None:
+    folders = [write_tiny_dataset(tmp_path / f"{seed}", seed=seed) for seed in (1, 2)]
+    assert Dataset(folders[0]).finger_sha256 is None
+    manifest = json.loads((folders[1] / "manifest.json").read_text())
+    manifest["campaign"]["finger_sha256"] = "f" * 64
+    (folders[1] / "manifest.json").write_text(json.dumps(manifest))
+    own = Dataset(folders[1])
+    assert own.finger_sha256 == "f" * 64
+    with pytest.raises(DatasetError, match="another finger"):
+        JoinedDataset([Dataset(folders[0]), own])
+
+    def trained(served: Served) -> dict[str, object]:
+        said = properties(served, "tiny", {}, {"seed": 0})["papilla.training"]
+        return dict(json.loads(said))
+
+    assert "finger_sha256" not in trained(finished.served)
+    served = dataclasses.replace(finished.served, finger_sha256=own.finger_sha256)
+    assert trained(served)["finger_sha256"] == "f" * 64

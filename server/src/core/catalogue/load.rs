@@ -134,6 +134,16 @@ pub(super) fn require_atlas(
     loading: Loading<'_>,
 ) -> Result<(), String> {
     if tier.atlas_hash == atlas.hash() {
+        // A finger that differs from the lender in bone or tissues alone has the same atlas.
+        let is_borrowed = |lender: &Similar<'_>| {
+            tier.kind.is_network()
+                && tier.finger_sha256.is_none()
+                && index.trained_on.as_deref() == Some(lender.name)
+                && tier.atlas_hash == lender.atlas.hash()
+        };
+        if let Some(lender) = loading.similar.filter(is_borrowed) {
+            tier.trained_on = Some(TrainedOn { name: lender.name.to_owned(), apart_px: 0.0 });
+        }
         return Ok(());
     }
     let (model, ours) = (&tier.atlas_hash, atlas.hash());
@@ -375,6 +385,7 @@ impl TierFiles<'_> {
             relative_l2_median: card.metrics.relative_l2.median,
             relative_l2_p95: card.metrics.relative_l2.p95,
             knows_contact: card.knows_contact(),
+            finger_sha256: card.finger_sha256().map(str::to_owned),
             effects: card.effects,
             atlas_hash: card.atlas_hash,
             onnx_sha256: card.onnx_sha256,

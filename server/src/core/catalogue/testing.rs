@@ -17,6 +17,7 @@ pub(crate) fn info(name: &str) -> ModelInfo {
         bytes: 0,
         weights: 0,
         atlas_hash: String::new(),
+        finger_sha256: None,
         effects: Vec::new(),
         network: json!({}),
         pressure_max_pa: 100.0,

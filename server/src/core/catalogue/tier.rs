@@ -31,6 +31,9 @@ pub(crate) struct Tier {
     /// Effects of the physics that it was trained with.
     pub(crate) effects: Vec<String>,
     pub(crate) atlas_hash: String,
+    /// Hash of dimensions and tissues of the finger whose simulations trained it; None: the default
+    /// finger, or no simulations.
+    pub(crate) finger_sha256: Option<String>,
     /// Greatest pressure it was trained on, Pa.
     pub(crate) pressure_max_pa: f32,
     /// Greatest statistics of the maps it was trained on, by which unfamiliar maps are recognised;

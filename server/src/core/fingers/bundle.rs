@@ -34,6 +34,21 @@ pub(crate) enum BundleError {
     Changed(String),
 }
 
+/// Said of a network of another finger.
+const OTHER_FINGER: &str = "the network was trained on simulations of another finger, or of this one \
+    before its dimensions or tissues were changed, than finger.contact was made of; train it anew, or \
+    take it away and lend one of the default finger (\"trained_on\": \"default\" in index.json)";
+
+/// Whether a network was trained on another finger than the one with this hash of dimensions and
+/// tissues, which may have the same atlas. An empty hash is not known. Networks that are lent are
+/// known to be of another finger, and closed forms are of none.
+fn is_of_other_finger(tier: &Tier, finger_sha256: &str) -> bool {
+    !finger_sha256.is_empty()
+        && tier.kind.is_network()
+        && tier.trained_on.is_none()
+        && tier.finger_sha256.as_deref() != Some(finger_sha256)
+}
+
 impl Bundle {
     /// Reads and checks the folder of the finger called `name`, which gets the place `place`.
     /// Models that `running` has loaded already are shared with it and not loaded again. `default`
@@ -81,6 +96,13 @@ impl Bundle {
             }
             None => None,
         };
+        if let Some(contact) = &contact {
+            let finger = &contact.model.header().finger_sha256;
+            if let Some(tier) = catalogue.tiers.iter().find(|tier| is_of_other_finger(tier, finger))
+            {
+                return Err(bad(&format!("{}.json", tier.name), OTHER_FINGER.to_owned()).into());
+            }
+        }
         let catalogue = Catalogue { name: name.to_owned(), place, ..catalogue };
         Ok(Some(Self { catalogue, contact, files_bytes: assets.bytes() }))
     }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::support::{add, folder, index, named, service, service_with, thumb_atlas};
 use crate::support::{
     GAIN, Service, add_model_of_gain,
-    contact::{atlas, atlas_of, ball_hello, deep, model, model_described, rows},
+    contact::{atlas, atlas_of, ball_hello, deep, model, model_described, model_of_finger, rows},
     hello, papilla, write,
 };
 
@@ -94,6 +94,29 @@ async fn a_folder_that_is_half_written_or_mixed_is_refused_with_what_is_wrong() 
         write(&folder, "skin.json", skin.as_bytes());
         write(&folder, "finger.contact", &model_described(&thumb_atlas(), &made));
     }
+    // Networks of a finger with the same atlas, whose tissues were others.
+    for (name, trained) in [("own-network", "a"), ("network-of-before", "b")] {
+        let folder = broken(name);
+        for tier in ["own", "quick"] {
+            let path = folder.join(format!("{tier}.json"));
+            let mut card: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+            card["training"]["finger_sha256"] = json!(trained.repeat(64));
+            fs::write(&path, card.to_string()).unwrap();
+        }
+        write(&folder, "finger.contact", &model_of_finger(&thumb_atlas(), &"a".repeat(64)));
+    }
+    write(
+        &broken("network-of-nobody"),
+        "finger.contact",
+        &model_of_finger(&thumb_atlas(), &"a".repeat(64)),
+    );
+    // A finger whose tissues alone are others than the default one's has the same atlas. With that
+    // finger's networks it says so.
+    add(fingers.path(), "softer", &atlas(), GAIN);
+    let softer = fingers.path().join("softer");
+    write(&softer, "finger.contact", &model_of_finger(&atlas(), &"a".repeat(64)));
+    let both = json!({"default": "own", "models": ["own", "quick"], "trained_on": "default"});
+    index(&softer, &both);
     let damaged = broken("damaged-contact").join("finger.contact");
     let bytes = fs::read(&damaged).unwrap();
     fs::write(&damaged, &bytes[..bytes.len() / 2]).unwrap();
@@ -123,6 +146,8 @@ async fn a_folder_that_is_half_written_or_mixed_is_refused_with_what_is_wrong() 
         ("no-net", &["own.onnx"]),
         ("torn", &["own.onnx"]),
         ("other-contact", &["finger.contact", "atlas"]),
+        ("network-of-before", &["own.json", "another finger"]),
+        ("network-of-nobody", &["own.json", "another finger"]),
         ("other-skin", &["finger.contact", "finger build"]),
         ("other-tissue", &["finger.contact", "finger build"]),
         ("damaged-contact", &["finger.contact"]),
@@ -135,7 +160,15 @@ async fn a_folder_that_is_half_written_or_mixed_is_refused_with_what_is_wrong() 
         let said = format!("finger '{name}'");
         assert_says(&error, "fingers[1].name", &[&[said.as_str()], words].concat());
     }
-    service.socket().await.open(hello(&named(&["as-made"]))).await;
+    let ready =
+        service.socket().await.open(hello(&named(&["as-made", "own-network", "softer"]))).await;
+    let lenders: Vec<&Value> = ready["finger_terms"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|terms| &terms["trained_on"])
+        .collect();
+    assert_eq!(lenders, [&Value::Null, &Value::Null, &json!("default")]);
     // Whoever mends it is not told the old fault once the models were reloaded.
     fs::copy(fingers.path().join("thumb/finger.toml"), fingers.path().join("no-toml/finger.toml"))
         .unwrap();

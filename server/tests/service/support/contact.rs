@@ -61,20 +61,27 @@ pub(crate) fn model() -> Vec<u8> {
 pub(crate) fn model_on(atlas: &Atlas, modulus_mpa: f32) -> Vec<u8> {
     let young_mpa = 0.75 * f64::from(modulus_mpa);
     let layer = |thickness_mm| Layer { young_mpa, poisson: 0.5 - 1e-6, thickness_mm };
-    file(atlas, modulus_mpa, vec![layer(0.2), layer(98.8)], "")
+    file(atlas, modulus_mpa, vec![layer(0.2), layer(98.8)], Header::current())
+}
+
+/// One of a finger with this hash of dimensions and tissues.
+pub(crate) fn model_of_finger(atlas: &Atlas, finger_sha256: &str) -> Vec<u8> {
+    let header = Header { finger_sha256: finger_sha256.to_owned(), ..Header::current() };
+    file(atlas, MODULUS_MPA, Vec::new(), header)
 }
 
 /// One that was made of the description with this hash.
 pub(crate) fn model_described(atlas: &Atlas, finger_file_sha256: &str) -> Vec<u8> {
-    file(atlas, MODULUS_MPA, Vec::new(), finger_file_sha256)
+    let header = Header { finger_file_sha256: finger_file_sha256.to_owned(), ..Header::current() };
+    file(atlas, MODULUS_MPA, Vec::new(), header)
 }
 
 /// [`model`] with other layers.
 pub(crate) fn model_of(layers: Vec<Layer>) -> Vec<u8> {
-    file(&atlas(), MODULUS_MPA, layers, "")
+    file(&atlas(), MODULUS_MPA, layers, Header::current())
 }
 
-fn file(atlas: &Atlas, modulus_mpa: f32, layers: Vec<Layer>, finger_file_sha256: &str) -> Vec<u8> {
+fn file(atlas: &Atlas, modulus_mpa: f32, layers: Vec<Layer>, header: Header) -> Vec<u8> {
     let skin = atlas.patch(papilla_proto::atlas::Patch::Skin);
     let vertices = skin.positions_mm.len();
     let header = Header {
@@ -82,9 +89,8 @@ fn file(atlas: &Atlas, modulus_mpa: f32, layers: Vec<Layer>, finger_file_sha256:
         triangles: atlas.triangles().len(),
         share_max: 1.0,
         layers,
-        finger_file_sha256: finger_file_sha256.to_owned(),
         atlas_hash: atlas.hash().to_owned(),
-        ..Header::current()
+        ..header
     };
     let arrays = Arrays::half_space(
         skin.positions_mm.as_flattened().to_vec(),
