@@ -179,7 +179,8 @@ def full() -> list[Step]:
             "cd model-export/trainer\n"
             '"$TARGET/venv-trainer/bin/python" -m ruff check .\n'
             'FE_DATAGEN="$BIN/fe-datagen" MODEL_EXPORT="$BIN/model-export" '
-            '"$TARGET/venv-trainer/bin/python" -m pytest -q -p no:cacheprovider',
+            '"$TARGET/venv-trainer/bin/python" -m pytest -q -p no:cacheprovider '
+            "--ignore=tests/test_teach.py",
             after=("build", "python"),
             tests_min=80,
         ),
@@ -290,6 +291,15 @@ def full() -> list[Step]:
 def long() -> list[Step]:
     """The long forms, beside `full`."""
     return [
+        Step(
+            "teach",
+            "a finger of one's own is taught: from its file over presses to a network, interrupted on the way",
+            "cd model-export/trainer\n"
+            'FE_DATAGEN="$BIN/fe-datagen" MODEL_EXPORT="$BIN/model-export" '
+            '"$TARGET/venv-trainer/bin/python" -m pytest -q -p no:cacheprovider tests/test_teach.py',
+            after=("build", "python"),
+            tests_min=4,
+        ),
         Step(
             "release",
             "what `cargo run --release` builds, and a look at all it would serve",

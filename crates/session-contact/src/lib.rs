@@ -59,7 +59,7 @@ use self::method::Chosen;
 
 /// Most bytes of one finger, pressed all over, by the dearest method; its objects aside. Held by
 /// `tests/memory.rs`.
-pub const FINGER_BYTES_MAX: usize = 18 << 20;
+pub const FINGER_BYTES_MAX: usize = 20 << 20;
 
 /// The skin that things press on.
 #[derive(Clone, Copy)]

@@ -154,6 +154,7 @@ def test_a_finger_gets_a_network_of_its_own(finger: Path) -> None:
     card = json.loads((finger / "pico.json").read_text())
     atlas = json.loads((finger / "teach/presses/manifest.json").read_text())["atlas_hash"]
     assert card["atlas_hash"] == atlas != shipped["atlas_hash"]
+    assert card["training"]["finger_sha256"] == report["finger_sha256"]
     assert card["training"]["start"]["onnx_sha256"] == shipped["onnx_sha256"]
     assert card["metrics"]["relative_l2"]["median"] == pytest.approx(after)
     assert card["pattern_max"]["load_mpa_px"] > 0.0

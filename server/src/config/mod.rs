@@ -202,7 +202,7 @@ pub struct Config {
     #[arg(long, env = "PAPILLA_MAX_SESSIONS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_sessions: NonZeroUsize,
 
-    /// Greatest number of fingers of all sessions, of up to 18 MiB each, but for one of each session
+    /// Greatest number of fingers of all sessions, of up to 20 MiB each, but for one of each session
     /// that sends maps of pressure; further ones are refused; 1 to 10000.
     #[arg(long, env = "PAPILLA_MAX_FINGERS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_fingers: NonZeroUsize,
