@@ -32,7 +32,12 @@ def interrupted():
     """Runs a program that prints "ready", and sends it Ctrl-C after some seconds; what it prints then."""
 
     def run(program: str, after_s: float, within_s: float = 60.0) -> str:
-        running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+        # What a shell starts in the background ignores Ctrl-C, and so do its children.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        try:
+            running = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+        finally:
+            signal.signal(signal.SIGINT, before)
         assert running.stdout.readline() == "ready\n"
         time.sleep(after_s)
         running.send_signal(signal.SIGINT)
