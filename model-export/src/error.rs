@@ -4,7 +4,7 @@ use crate::part::Part;
 use papilla_dataset::DatasetError;
 use papilla_engine::EngineError;
 use papilla_output::OutputError;
-use papilla_proto::atlas::AtlasError;
+use papilla_proto::atlas::{Atlas, AtlasError};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -185,6 +185,15 @@ pub fn read_text(path: &Path) -> Result<String, ExportError> {
         path: path.to_owned(),
         source,
     })
+}
+
+/// Reads an atlas.
+///
+/// # Errors
+/// [`ExportError::Io`], [`ExportError::Atlas`] naming the file.
+pub fn read_atlas(path: &Path) -> Result<Atlas, ExportError> {
+    let refused = |source| ExportError::Atlas { path: path.to_owned(), source };
+    Atlas::from_json(&read_text(path)?).map_err(refused)
 }
 
 /// Writes a file so that it is whole or absent; its folder is made if it is not there.

@@ -38,4 +38,4 @@ pub mod reference;
 pub mod shear;
 pub mod table;
 
-pub use error::{ExportError, read, read_text, write};
+pub use error::{ExportError, read, read_atlas, read_text, write};

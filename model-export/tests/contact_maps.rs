@@ -8,8 +8,9 @@ use ndarray_npy::NpzReader;
 use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::MAP_LEN;
 use papilla_fingertip::campaign::CampaignSpec;
-use papilla_model_export::contact::{ContactMaps, Labeller, Models, PseudoLabels, read_atlas};
+use papilla_model_export::contact::{ContactMaps, Labeller, Models, PseudoLabels};
 use papilla_model_export::dataset::Dataset;
+use papilla_model_export::read_atlas;
 use std::io::Cursor;
 use std::path::Path;
 

@@ -1,7 +1,6 @@
 //! From which description of a finger a contact model was made.
 
 use sha2::{Digest, Sha256};
-use std::fmt::Write as _;
 use toml::{Table, Value};
 
 /// The table that says where a finger is from; no number depends on it.
@@ -34,12 +33,7 @@ pub fn finger_file_sha256(
     if let Some(bytes) = name.and_then(skin) {
         hash.update(bytes);
     }
-    let mut text = String::with_capacity(64);
-    for byte in hash.finalize() {
-        // A String takes whatever is written.
-        let _ = write!(text, "{byte:02x}");
-    }
-    Ok(text)
+    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 /// A value as text; tables by the order of their keys.

@@ -4,9 +4,8 @@ use super::options::RunModel;
 use super::{load_card, load_model, print_json};
 use papilla_engine::ModelInfo;
 use papilla_model_export::evaluate::require_atlas;
-use papilla_model_export::{ExportError, read_text};
-use papilla_proto::atlas::Atlas;
-use std::path::{Path, PathBuf};
+use papilla_model_export::read_atlas;
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
@@ -25,7 +24,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let model = load_model(&options.run.model, options.run.backend, card.as_ref())?;
     let info = model.info();
     if let Some(path) = &options.atlas {
-        require_atlas(&path.display().to_string(), load_atlas(path)?.hash(), info)?;
+        require_atlas(&path.display().to_string(), read_atlas(path)?.hash(), info)?;
     }
     if json {
         return print_json(info);
@@ -38,11 +37,6 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     }
     println!("ok           the model keeps the contract");
     Ok(())
-}
-
-pub(super) fn load_atlas(path: &Path) -> Result<Atlas, ExportError> {
-    let refused = |source| ExportError::Atlas { path: path.to_owned(), source };
-    Atlas::from_json(&read_text(path)?).map_err(refused)
 }
 
 fn describe(info: &ModelInfo) -> String {

@@ -1,11 +1,10 @@
 //! `model-export index`.
 
-use super::check::load_atlas;
 use super::{load_card, load_model, print_json};
 use anyhow::{Context, bail};
 use papilla_engine::{Backend, card::Index};
 use papilla_model_export::evaluate::require_atlas;
-use papilla_model_export::{ExportError, write};
+use papilla_model_export::{ExportError, read_atlas, write};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
@@ -33,7 +32,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
             path.display()
         );
     }
-    let atlas = load_atlas(&path)?;
+    let atlas = read_atlas(&path)?;
     let mut models = names(&options.folder)?;
     // From small to large: the order in which they are offered.
     models.sort_by_key(|(bytes, name)| (*bytes, name.clone()));

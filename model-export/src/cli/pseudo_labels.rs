@@ -3,8 +3,8 @@
 use super::{load_model, print_json};
 use papilla_engine::Backend;
 use papilla_fingertip::campaign::CampaignSpec;
-use papilla_model_export::contact::{Labeller, Models, PseudoLabels, read_atlas};
-use papilla_model_export::{ExportError, evaluate, write};
+use papilla_model_export::contact::{Labeller, Models, PseudoLabels};
+use papilla_model_export::{ExportError, evaluate, read_atlas, write};
 use papilla_progress::Progress;
 use serde_json::json;
 use std::path::PathBuf;

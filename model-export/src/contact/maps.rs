@@ -3,7 +3,7 @@
 use super::{Models, Placed, Rung, pixel_contact};
 use crate::ExportError;
 use crate::dataset::Dataset;
-use papilla_contact::{Contact, PixelSpacing};
+use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Solver};
 use papilla_dataset::Split;
 use papilla_engine::MAP_SIDE_PX;
 use papilla_output::{OutputError, npz::NpzBuilder};
@@ -19,6 +19,18 @@ pub struct ContactMaps {
     pub pressure_pa: Vec<f32>,
     /// States without a map: unsettled, out of range or never touched.
     pub left_out: usize,
+}
+
+/// Solves an object on pixels from nothing; whether it touches, settles and is within the range.
+pub(super) fn settles_from_nothing(
+    object: Option<Object>,
+    (solver, pixels, out): (&mut Solver, &mut PixelContact, &mut Contact),
+) -> bool {
+    solver.reset();
+    pixels.reset();
+    object.is_some_and(|object| solver.solve_on_pixels(&[object], pixels, out).is_ok())
+        && out.quality.settled
+        && !out.quality.out_of_range
 }
 
 impl ContactMaps {
@@ -43,12 +55,7 @@ impl ContactMaps {
             for state in 0..indentation.samples {
                 let depth_mm = f64::from(shard.depth_mm[state]);
                 let object = placed.as_ref().map(|p| p.at(depth_mm, shard.slid_mm(state)));
-                solver.reset();
-                pixels.reset();
-                let solved = object.is_some_and(|object| {
-                    solver.solve_on_pixels(&[object], &mut pixels, &mut out).is_ok()
-                });
-                if !solved || !out.quality.settled || out.quality.out_of_range {
+                if !settles_from_nothing(object, (&mut solver, &mut pixels, &mut out)) {
                     maps.left_out += 1;
                     continue;
                 }

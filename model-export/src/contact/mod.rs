@@ -7,7 +7,7 @@ mod pseudo_labels;
 
 pub use self::maps::ContactMaps;
 pub(crate) use self::placed::Placed;
-pub use self::pseudo_labels::{Labeller, PseudoLabels, read_atlas};
+pub use self::pseudo_labels::{Labeller, PseudoLabels};
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile, relative_l2};
 use crate::processor::thread_s;

@@ -5,8 +5,9 @@
 //! milliseconds. So there can be far more of these pairs than of simulated ones, at poses and depths
 //! in between.
 
+use super::maps::settles_from_nothing;
 use super::{Models, Placed, Rung};
-use crate::{ExportError, read_text};
+use crate::ExportError;
 use papilla_contact::{Contact, PixelContact, PixelSkin, PixelSpacing};
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX, Session};
 use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
@@ -123,14 +124,8 @@ impl<'a> Labeller<'a> {
     ) -> Result<(), ExportError> {
         for (depth_mm, slide_mm) in indentation.states() {
             let object = placed.map(|placed| placed.at(depth_mm, slide_mm));
-            self.solver.reset();
-            self.pixels.reset();
-            let solved = object.is_some_and(|object| {
-                let objects = std::slice::from_ref(&object);
-                self.solver.solve_on_pixels(objects, &mut self.pixels, &mut self.contact).is_ok()
-            });
-            let quality = &self.contact.quality;
-            if !solved || !quality.settled || quality.out_of_range {
+            let parts = (&mut self.solver, &mut self.pixels, &mut self.contact);
+            if !settles_from_nothing(object, parts) {
                 labels.left_out += 1;
                 continue;
             }
@@ -143,13 +138,4 @@ impl<'a> Labeller<'a> {
         }
         Ok(())
     }
-}
-
-/// Reads the atlas of a folder of models.
-///
-/// # Errors
-/// [`ExportError::Io`], [`ExportError::Atlas`].
-pub fn read_atlas(path: &Path) -> Result<Atlas, ExportError> {
-    let refused = |source| ExportError::Atlas { path: path.to_owned(), source };
-    Atlas::from_json(&read_text(path)?).map_err(refused)
 }

@@ -16,11 +16,11 @@ mod sets;
 mod traction;
 
 use crate::metrics::Ground;
-use crate::{ExportError, read_text};
+use crate::{ExportError, read_atlas, read_text};
 use papilla_engine::MODEL_FORMAT;
 use papilla_engine::card::Index;
 use papilla_engine::ladder::{Ladder, REFERENCE_SET, SET_NAMES};
-use papilla_proto::atlas::{Atlas, Patch, Raster};
+use papilla_proto::atlas::{Patch, Raster};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -64,9 +64,7 @@ impl Canvas {
     /// # Errors
     /// [`ExportError::Io`], [`ExportError::Atlas`].
     pub fn read(models: &Path) -> Result<Self, ExportError> {
-        let path = models.join("atlas.json");
-        let atlas = Atlas::from_json(&read_text(&path)?)
-            .map_err(|source| ExportError::Atlas { path, source })?;
+        let atlas = read_atlas(&models.join("atlas.json"))?;
         let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
         let ground = Ground::new(&atlas, &interface);
         Ok(Self {
