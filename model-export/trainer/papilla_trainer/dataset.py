@@ -96,6 +96,13 @@ class Dataset:
         if not self.train_ids or not self.test_ids:
             raise DatasetError(f"{directory}: a split is empty; generate more presses")
 
+    def _take_over(self, other: Dataset) -> None:
+        """All that ``other`` says of itself, for a view that then changes what it shares out.
+
+        A member that is added to this class reaches every view by this.
+        """
+        self.__dict__.update({k: v for k, v in other.__dict__.items() if k != "drawn"})
+
     @cached_property
     def drawn(self) -> DrawnMaps:
         """All maps, on disk. Whoever draws them checks hashes, splits and values of the dataset."""

@@ -21,7 +21,7 @@ class JoinedDataset(Dataset):
     """
 
     def __init__(self, parts: list[Dataset]) -> None:
-        self.parts, first = parts, parts[0]
+        first = parts[0]
         for other in parts[1:]:
             if other.finger_sha256 != first.finger_sha256:
                 raise DatasetError(f"{other.directory}: of another finger than {first.directory}")
@@ -29,10 +29,8 @@ class JoinedDataset(Dataset):
                 raise DatasetError(
                     f"{other.directory}: of another atlas or other effects than {first.directory}"
                 )
-        self.directory = first.directory
-        self.atlas_hash, self.effects = first.atlas_hash, first.effects
-        self.finger_sha256 = first.finger_sha256
-        self.vertex_count = first.vertex_count
+        self._take_over(first)
+        self.parts = parts
         self.pressure_max_pa = max(part.pressure_max_pa for part in parts)
         self.sed_max_j_per_m3 = max(part.sed_max_j_per_m3 for part in parts)
         self.hashes = [part.dataset_sha256 for part in parts]

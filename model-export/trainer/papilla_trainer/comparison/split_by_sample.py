@@ -17,13 +17,8 @@ class SplitBySample(Dataset):
     """As many states for testing as ``whole`` has, drawn by lot. Press 7 is the state in row 7."""
 
     def __init__(self, whole: Dataset, seed: int) -> None:
+        self._take_over(whole)
         self.whole = whole
-        self.directory, self.store = whole.directory, whole.store
-        self.atlas_hash, self.effects = whole.atlas_hash, whole.effects
-        self.vertex_count = whole.vertex_count
-        self.pressure_max_pa = whole.pressure_max_pa
-        self.sed_max_j_per_m3 = whole.sed_max_j_per_m3
-        self.dataset_sha256, self.hashes = whole.dataset_sha256, whole.hashes
         states = sum(press.samples for press in whole.presses.values())
         tests = sum(whole.presses[i].samples for i in whole.test_ids)
         self.presses = {row: Press(row, 1) for row in range(states)}
