@@ -12,7 +12,10 @@ mod report;
 mod sequence;
 mod steps;
 
-use super::super::{print, signals};
+use super::{
+    super::{print, signals},
+    build::described,
+};
 use error::TeachError;
 use lender::Lender;
 use papilla_contact::ContactModel;
@@ -142,7 +145,8 @@ fn teach(args: &Args, stop: std::sync::Arc<std::sync::atomic::AtomicBool>) -> an
     print(&report, args.json, || report.human())
 }
 
-/// Whether the bundle has a contact model of this very finger, with its atlas.
+/// Whether the bundle has a contact model of this very finger, as its file describes it now, with its
+/// atlas.
 fn has_contact(args: &Args, finger: &Finger) -> anyhow::Result<bool> {
     let path = args.contact_path();
     if !path.is_file() || !args.finger.join("atlas.json").is_file() {
@@ -150,5 +154,6 @@ fn has_contact(args: &Args, finger: &Finger) -> anyhow::Result<bool> {
     }
     let model = ContactModel::read(&std::fs::read(&path)?)
         .map_err(|error| anyhow::anyhow!("{}: {error}; take it away", path.display()))?;
-    Ok(model.header().finger_sha256 == finger.sha256())
+    let is_of_its_file = model.require_finger_file(&described(&args.finger)?).is_ok();
+    Ok(model.header().finger_sha256 == finger.sha256() && is_of_its_file)
 }
