@@ -301,41 +301,48 @@ def draw(perfect, rows):
 HEAD = """\
 # What a sensor costs in accuracy
 
-**Question.** How far off are strain energy density (SED), force and the firing of SA1 afferents (slowly adapting
-nerve fibres of type 1) if pressure is not known everywhere, but read by an array of taxels? The command
-
-```sh
-python studies/sensors.py measure
-```
-
-writes this page beside a running `papilla-server`. Written on {date}, {machine}.
+**Question.** Strain energy density (SED), force and the firing of SA1 afferents (slowly adapting nerve fibres of
+type 1) can be computed from pressure. How wrong are they if pressure is not known everywhere, but was read by an
+array of taxels (the cells of a pressure sensor)? The [list of studies](../README.md#networks-and-contact) has the
+answer in short.
 
 **Method.** {states} states of the finite-element (FE) solver, which no network was trained on, are read by virtual
 arrays. An array covers the pad from below, without gaps. A reading is the mean pressure over a taxel. Noise is
-normal and independent; its standard deviation is a share of the state's greatest reading. Readings become a map
-of pressure in one of three ways, and the network `{tier}` makes SED of it. All errors are against the FE state
-itself, so they include the network's own: the row *true pressure* has that alone.
+normal and independent; its standard deviation is a share of the state's greatest reading. Then a map of pressure is
+made from the readings, in one of three ways:
 
 | way | what it does |
 |---|---|
 | nearest taxel | each point of the skin has the reading of the taxel that covers it |
 | bilinear | linear between the middles of the taxels |
-| smoothest field | the way of `papilla.sensors`: a smooth field that is nowhere negative and has the readings as its means |
+| smoothest field | the way of `papilla.sensors`: the smoothest field that is nowhere negative and has the readings as its means |
 
-The first two drop readings below two standard deviations of the noise. The constants of the third were chosen on
-training states (`sensors.py choose`). *SED* is the relative L2 norm of the error over the map, where 100 % is as
-wrong as a map of zeros. *Force* is the integral of pressure over the undeformed skin. *SA1* is the sum of the
-static rates of all SA1 afferents, by the formula of the effect
-[`afferents`](../../docs/reference/protocol-effects.md#afferents).
+The first two ignore readings below two standard deviations of the noise. The constants of the third were chosen on
+training states (`sensors.py choose`). The network `{tier}` computes SED from the map. The truth is the FE state
+itself, so all errors contain that of the network. The row *true pressure* has the error of the network alone.
+
+| column | meaning |
+|---|---|
+| pitch | distance between the middles of neighbouring taxels |
+| noise | standard deviation of the noise, as a share of the state's greatest reading |
+| SED | relative L2 norm of the error over the map; 100 % is as wrong as a map of zeros |
+| force | error of the integral of pressure over the undeformed skin |
+| SA1 | error of the sum of the static rates of all SA1 afferents, by the formula of the effect [`afferents`](../../docs/reference/protocol-effects.md#afferents) |
+
+This command writes the page, beside a running `papilla-server`. It was written on {date}, {machine}.
+
+```sh
+python studies/sensors.py measure
+```
 
 ![errors by pitch and noise](pictures/sensors.png)
 
-Medians over all states. Grey dashes: pressure known everywhere.
+The picture has medians over all states. Grey dashes: the true pressure, known everywhere.
 """.replace("{tier}", TIER)
 
 SHAPES = """\
-Median error of SED with the smoothest field and without noise. Each row is a shape of indenter, by the name that
-its campaign gives it, in the order of the error at 1 mm.
+Median relative L2 error of SED with the smoothest field and without noise, by shape and pitch. The names of the
+shapes are those of their campaign; the rows are in the order of the error at 1 mm.
 """
 
 
