@@ -44,8 +44,7 @@ impl Report {
     pub fn markdown(&self) -> String {
         let mut text = format!(
             "{}{}. Materials: {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
-             `coarse`.\n\n## Rows\n\n| quantity | finger here | people | spread | source | verdict | what would \
-             mend it |\n|---|---|---|---|---|---|---|\n",
+             `coarse`.\n\n## Rows\n\n| quantity | the model | people | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
             HEAD.replace("DENSITY", density(self.density)),
             self.made,
             self.materials.name(),
@@ -79,9 +78,8 @@ impl Report {
     fn plates(&self, text: &mut String) {
         let _ = write!(
             text,
-            "\n## Plates\n\n![Force under a plate]({PICTURES}/force.svg)\n\nThe plate without \
-                friction, pressed step by step. The table holds every fourth state; all of them \
-                are in \
+            "\n## Plates\n\n![Force under a plate]({PICTURES}/force.svg)\n\nThe plate is pressed step by step, without friction. The table holds every fourth state; all of \
+         them are in \
              [human-plates.csv](human-plates.csv).\n\n"
         );
         text.push_str("| plate | depth, mm | force, N | stiffness, N/mm | contact area, mm2 |\n");

@@ -25,16 +25,16 @@ pub(super) fn afferents(text: &mut String, found: &Afferents) {
         .map_or(f64::NAN, |p| p.measured_per_s.last().unwrap_or(&f64::NAN) / p.measured_per_s[0]);
     let _ = write!(
         text,
-        "\n## SA1 rates\n\nThe rate of a fibre is taken as `gain (felt - threshold)`, and as 0 where that is \
-         negative. Gain and threshold are fitted to the rates at the smallest force alone. They \
-         are tested on the rates at the other forces, and on the *profiles*, which are the rates \
-         at several distances from the sphere's middle. The threshold is not negative, since SA1 \
-         fibres are silent at rest; the column *either sign* is without this bound. R2 is the coefficient \
-         of determination: 1 is a perfect prediction, and a negative R2 says that the mean rate would be a \
-         better prediction. *Growth* is the ratio of the stimulus under the most curved sphere to that under \
-         the least curved one, at the smallest force; the measured rate grows {people:.1} times. *Peaks* are \
-         the distances from the sphere's middle at which the two profiles are greatest, with those of the \
-         measured profiles in brackets. The force of each state is within {:.1} % of the force of the \
+        "\n## SA1 rates\n\nThe rate of a fibre is predicted as `gain (felt - threshold)`, or as 0 where this is negative. \
+         Gain and threshold are fitted only to the rates at the smallest force. The prediction is tested \
+         on the rates at the other forces, and on the *profiles*: the rates at several distances from the \
+         sphere's middle. The threshold is not allowed to be negative, since SA1 fibres do not fire at \
+         rest. One column shows what happens if this is allowed (*threshold of either sign*). R2 is the coefficient of determination: 1 is \
+         a perfect prediction, and a negative R2 says that the mean rate would be a better one. *Growth* \
+         is the stimulus under the most curved sphere, divided by that under the least curved one, at the \
+         smallest force; the measured rate grows {people:.1} times. *Peaks* are the distances from the \
+         sphere's middle at which the two profiles are greatest, with those of the measured profiles in \
+         brackets. The force of each state is within {:.1} % of the force of the \
          experiment, and the stimulus is interpolated to it. Energy and work differ by {:.2} % at most. All spheres took {:.0} s of processor time.\n\n",
         100.0 * found.force_missed_max,
         100.0 * found.energy_vs_work_max,
@@ -42,13 +42,12 @@ pub(super) fn afferents(text: &mut String, found: &Afferents) {
     );
     explained(text, found);
     text.push_str(
-        "The table holds SED at the interface, and every stimulus at the depth at which its R2 \
-            of the rates that were not fitted is greatest. All depths are in [human-felt.csv](human-felt.csv), and measured and predicted rates in \
+        "The table holds SED at the interface. It holds every other stimulus only at one depth: that at \
+         which its R2 of the rates that were not fitted is greatest. All depths are in [human-felt.csv](human-felt.csv), and measured and predicted rates in \
          [human-rates.csv](human-rates.csv).\n\n",
     );
     text.push_str(
-        "| felt | gain, impulses/s | threshold | growth | R2 of the fit | **R2 of the others** | either \
-         sign | R2 of the profiles | peaks, mm (people's) |\n|---|---|---|---|---|---|---|---|---|\n",
+        "| stimulus and its unit | gain, impulses/s for each unit | threshold, in this unit | growth | R2 of the fitted rates | **R2 of the rates not fitted** | the same, threshold of either sign | R2 of the profiles | peaks, mm (measured) |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for fit in shown(&found.fits) {
         let _ = writeln!(text, "| {} |", cells(fit).join(" | "));
@@ -136,8 +135,9 @@ fn explained(text: &mut String, found: &Afferents) {
     let sed = &found.fits[0];
     let _ = writeln!(
         text,
-        "- **SED at the interface**: R2 is {:.2} for the rates that were not fitted ({:.2} with a threshold of either \
-         sign) and {:.2} for the profiles. SED grows {:.1} times from the first sphere to the last.",
+        "- **SED at the interface.** R2 of the rates that were not fitted is {:.2} ({:.2} with a threshold of either \
+         sign), and R2 of the profiles is {:.2}. SED grows {:.1} times from the least curved sphere to the most \
+         curved one.",
         sed.r2_others, sed.r2_others_free, sed.r2_profiles, sed.growth
     );
     let most = |pick: fn(&Fit) -> bool, of: fn(&Fit) -> f64| {
@@ -151,8 +151,8 @@ fn explained(text: &mut String, found: &Afferents) {
         if let (Some(r), Some(p)) = (rates, profiles) {
             let _ = writeln!(
                 text,
-                "- **{what}** {} explains the rates best (R2 of the rates {:.2}, of the profiles {:.2}), and {} \
-                 the profiles (R2 of the profiles {:.2}, of the rates {:.2}).",
+                "- **{what}.** The rates are explained best by {} (R2 of the rates {:.2}, of the profiles {:.2}). The \
+                 profiles are explained best by {} (R2 of the profiles {:.2}, of the rates {:.2}).",
                 r.name(),
                 r.r2_others,
                 r.r2_profiles,
@@ -168,11 +168,10 @@ fn explained(text: &mut String, found: &Afferents) {
 /// How far what is felt moves on a finer mesh: the worst of all depths.
 pub(super) fn mesh_errors(text: &mut String, errors: &[MeshError]) {
     text.push_str(
-        "\n## The mesh's own error\n\nHow far each stimulus under the sphere's middle differs \
-            from that on the next finer mesh, at the force where the difference is greatest. The \
-            table holds the depth and the sphere with the greatest difference; all of them are \
-            in \
-         [human-mesh.csv](human-mesh.csv).\n\n| felt | curvature of the sphere, 1/m | difference |\n|---|---|---|\n",
+        "\n## The mesh's own error\n\nThe table says how far a stimulus under the sphere's middle differs from that on the next finer \
+         mesh, at the force with the greatest difference. For each stimulus it holds the depth and the \
+         sphere with the greatest difference. All of them are in \
+         [human-mesh.csv](human-mesh.csv).\n\n| stimulus | curvature of the sphere, 1/m | difference |\n|---|---|---|\n",
     );
     for stimulus in Stimulus::ALL {
         let of = errors.iter().filter(|e| e.stimulus == stimulus);
