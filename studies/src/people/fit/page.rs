@@ -43,14 +43,14 @@ impl Fit {
         }
         text.push_str("\n\n## Constants\n\n");
         text.push_str(
-            "| constant | value | least | largest | known to | least: source | largest: source |\n\
+            "| constant | fitted value | lower bound | upper bound | standard error | source of the lower bound | source of the upper bound |\n\
              |---|---|---|---|---|---|---|\n",
         );
         for c in &self.constants {
             let p = &c.parameter;
             let _ = writeln!(
                 text,
-                "| {} | {}{} | {} | {} | {:.0} % of the way | {} | {} |",
+                "| {} | {}{} | {} | {} | {:.0} % | {} | {} |",
                 p.name,
                 c.value,
                 if c.at_bound { " (at its bound)" } else { "" },
@@ -63,9 +63,9 @@ impl Fit {
         }
         let _ = write!(
             text,
-            "\n*Known to* is the standard error of the constant, as a share of the distance between its \
-             bounds on a logarithmic scale; at 100 % the rows do not determine it. Half the sum of the squared residuals falls from {:.3} to \
-             {:.3} in {} evaluations ({}), {:.0} s of processor time.\n\n## Rows\n\n| quantity | people | at \
+            "\n*Standard error* is that of the constant, as a share of the distance between its bounds on a \
+         logarithmic scale. At 100 % the rows do not determine the constant. Half the sum of the squared \
+         residuals falls from {:.3} to {:.3} in {} evaluations ({}), {:.0} s of processor time.\n\n## Rows\n\n| quantity | people | at \
              the start | at the end | weighted residual at the end |\n|---|---|---|---|---|\n",
             self.cost[0],
             self.cost[1],
@@ -109,8 +109,8 @@ impl Fit {
         let stays = 1.0 - s.share.iter().sum::<f64>();
         let _ = write!(
             text,
-            "\nPeople: {} %. The relaxation times are {:?} s and their shares {:?}. A share of {:.3} stays, so the \
-             modulus against a sudden strain is {:.0} times that against a held one.\n",
+            "\nPeople: {} %. The relaxation times are {:?} s and their shares {:?}. A share of {:.3} does not relax, so the \
+         modulus against a sudden strain is {:.0} times that against a held strain.\n",
             s.people_percent,
             s.time_s,
             s.share.iter().map(|g| (1e4 * g).round() / 1e4).collect::<Vec<_>>(),

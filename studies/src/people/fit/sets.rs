@@ -48,9 +48,9 @@ impl Sets {
     /// The tables of the page.
     pub(super) fn page(&self, text: &mut String) {
         text.push_str(
-            "\n## What it does to every row\n\nBoth sets are on the even coarse mesh. The \
-                [comparison](human.md#rows) has the default set on the graded mesh; the \
-                difference is the error of the coarse mesh.\n\n| quantity | people \
+            "\n## What it does to every row\n\nBoth sets were computed on the even coarse mesh. The [comparison](human.md#rows) has the default \
+         set on the graded mesh. Where its figures differ from those here, this is the error of the \
+         coarse mesh.\n\n| quantity | people \
              | default set | verdict | fitted set | verdict | what would bring the fitted set nearer \
              |\n|---|---|---|---|---|---|---|\n",
         );
@@ -71,10 +71,10 @@ impl Sets {
             return;
         }
         text.push_str(
-            "\n## What it does to maps\n\nMaps with the fitted set against maps with the default set at \
-             the same force, both on the even coarse mesh. L2 is the relative L2 difference over the vertices. \
-             The peaks are changes of the greatest value. SED is the strain energy density. *Depths* are those \
-             of the default and of the fitted finger.\n\n| indenter | force, N | depths, mm | pressure, L2 | peak of \
+            "\n## What it does to maps\n\nMaps with the fitted set are compared with maps with the default set, at the same force and on \
+         the even coarse mesh. L2 is the relative L2 norm of the difference over the vertices, and a \
+         *peak* is the change of the greatest value. SED is the strain energy density. *Depths* are those \
+         of the default finger and of the fitted one.\n\n| indenter | force, N | depths, mm | pressure, L2 | peak of \
              pressure | SED at the interface, L2 | peak of SED |\n|---|---|---|---|---|---|---|\n",
         );
         for c in &self.maps {
