@@ -117,7 +117,7 @@ sealed partial class Run : IDisposable
 
     void Hello(JObject step, JObject expect)
     {
-        var hello = Papilla.Hello.FromJson((JObject)step["hello"]);
+        var hello = TypedHello.Of((JObject)step["hello"]);
         lock (gate) reply = null;
         if (session == null)
         {

@@ -87,8 +87,8 @@ sealed partial class Run : IDisposable
         tiers[0] = model.Name;
         try
         {
-            if (session == null) session = new NativeSession(model, Papilla.Hello.FromJson(hello));
-            else session.Open(model, Papilla.Hello.FromJson(hello));
+            if (session == null) session = new NativeSession(model, TypedHello.Of(hello));
+            else session.Open(model, TypedHello.Of(hello));
         }
         catch (PapillaException error)
         {

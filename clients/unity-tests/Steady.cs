@@ -7,7 +7,11 @@ using Papilla;
 static class Steady
 {
     const int Warm = 100, Frames = 900;
-    const string Ball = "{'input': 'objects', 'objects': [{'shape': {'shape': 'sphere', 'radius_mm': 10}}], 'pressure': 'vertices', 'answer_layout': 'vertices', 'shear': true, 'effects': ['spikes']}";
+    static readonly Hello Ball = new Hello
+    {
+        Objects = { new TouchObject { Shape = new SphereShape { RadiusMm = 10 } } },
+        Pressure = SampleLayout.Vertices, AnswerLayout = SampleLayout.Vertices, Shear = true, Displacement = true, Effects = { new SpikesEffect() },
+    };
 
     static int Main(string[] arguments)
     {
@@ -22,7 +26,7 @@ static class Steady
         // In turns, so that units fire.
         var poses = new[] { new[] { new Pose(11.25f, 0, -16.2f) }, new[] { new Pose(11.25f, 0, -15.8f) } };
         int turn = 0;
-        var hello = isContact ? Hello.FromJson(JObject.Parse(Ball)) : new Hello { Tier = "half-space" };
+        var hello = isContact ? Ball : new Hello { Tier = "half-space" };
         using (var session = new Session(Environment.GetEnvironmentVariable("PAPILLA_URL"), hello).Open())
         {
             session.WaitReady(20000);
@@ -46,7 +50,7 @@ static class Steady
             uint sequence = send();
             Answer answer = null;
             while (!session.TryTakeLatest(out answer)) Thread.Sleep(0);
-            if ((answer.Spikes != null) != isContact || (answer.ShearPa != null) != isContact) throw new Exception("spikes and shear are not as asked for");
+            if ((answer.Spikes != null) != isContact || (answer.ShearPa != null) != isContact || (answer.DisplacementMm != null) != isContact) throw new Exception("spikes and shear are not as asked for");
             for (int spike = 0; spike < answer.SpikeCount; spike++, spikes++)
             {
                 // Of this frame and of the 65 ms before it.

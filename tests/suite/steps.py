@@ -231,7 +231,7 @@ def full() -> list[Step]:
         Step("client-rust", "the Rust client", f"{client} rust", ("build", "packages"), 33, ("doc",)),
         Step("client-web", "the web client", f"{client} web", ("build", "node", "packages"), 39),
         Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 80),
-        Step("godot-generated", "the Godot 4 add-on is what its source makes", "clients/godot/generate --check"),
+        Step("godot-generated", "the Godot 4 add-on is what its source makes", "clients/hello/generate --check\nclients/godot/generate --check"),
         Step("client-godot3", "the Godot 3 add-on", f"{client} godot3", ("build", "packages"), 33),
         Step(
             "client-godot4",

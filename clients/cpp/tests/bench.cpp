@@ -40,10 +40,12 @@ int main(int argc, char** argv) {
   papilla::Session::Options options;
   const char* const url = std::getenv("PAPILLA_URL");
   if (url) options.url = url;
-  options.hello = R"("tier": "half-space")";
+  options.hello.tier = "half-space";
   if (sends_poses) {
-    options.hello += R"(, "input": "objects", "pressure": "vertices", "answer_layout": "vertices",
-                        "objects": [{"shape": {"shape": "sphere", "radius_mm": 10}}])";
+    options.hello.objects = {{papilla::SphereShape{10.0}, {}}};
+    options.hello.pressure = papilla::SampleLayout::vertices;
+    options.hello.answer_layout = papilla::SampleLayout::vertices;
+    options.hello.displacement = true;
   }
   const papilla::Pose ball{{11.25F, 0.0F, -16.2F}};
   // The client time is the instant at which the frame was meant to leave.

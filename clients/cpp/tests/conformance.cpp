@@ -7,14 +7,9 @@
 #include <sstream>
 
 #include "checks.hpp"
+#include "typed.hpp"
 
 namespace {
-
-/// Members of an object without its braces.
-std::string members(const Value& hello) {
-  const std::string text = json::print(hello);
-  return text.substr(1, text.size() - 2);
-}
 
 struct Outcome {
   std::uint32_t sequence;
@@ -88,12 +83,12 @@ class Run {
     bool good;
     Problem problem;
     if (session_) {
-      good = session_->renew(members(step["hello"]));
+      good = session_->renew(typed::hello(step["hello"]));
       problem = session_->problem();
     } else {
       Session::Options options;
       options.url = url_;
-      options.hello = members(step["hello"]);
+      options.hello = typed::hello(step["hello"]);
       options.on_answer = [this](const Answer& answer) {
         std::lock_guard<std::mutex> lock(mutex_);
         outcomes_.push_back({answer.sequence, answer.status, answer.by_client});

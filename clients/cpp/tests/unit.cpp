@@ -74,10 +74,31 @@ static void numbers() {
 // A hello that cannot be read is refused here, with the place: an empty one took its place.
 static void hellos() {
   papilla::Session::Options options;
-  options.hello = R"("objects": [{"shape": {"shape": "sphere", "radius_mm": 10,5}}])";
+  options.hello.more = R"("objects": [{"shape": {"shape": "sphere", "radius_mm": 10,5}}])";
   papilla::Session session(options);
   CHECK(!session.open() && session.problem().code == "bad_json");
   CHECK(session.problem().message.find("10,5") != std::string::npos);
+}
+
+// What is said of types, defaults and all; members of the hello that are as usual are not.
+static void typed_hellos() {
+  using namespace papilla;
+  Hello hello;
+  CHECK(hello.members().empty());
+  hello.objects = {{SphereShape{10.5}, {0.5, 0.25}}, {UnionShape{{{PlateShape{}, {0.0, 0.0, -4.0}}}}, {}}};
+  hello.effects = {SummaryEffect{}, PointsEffect{{SkinPoint::px(112, 90), SkinPoint::mm(11.25, 0, -6.5)}}, OtherEffect{"layers", ""}};
+  hello.map = false;
+  hello.more = R"("new_member": 1)";
+  const std::string due =
+      R"("input":"objects","objects":[{"shape":{"shape":"sphere","radius_mm":10.5},"stiffness_mpa_per_mm":0.5,"friction":0.25},)"
+      R"({"shape":{"shape":"union","parts":[{"part":{"shape":"plate","size_mm":[20,20],"edge_radius_mm":1},"at_mm":[0,0,-4],)"
+      R"("yaw_deg":0,"pitch_deg":0,"roll_deg":0}]},"friction":0}],"map":false,"effects":["summary","points","layers"],)"
+      R"("points":[{"px":[112,90]},{"mm":[11.25,0,-6.5]}],"new_member": 1)";
+  CHECK(hello.members() == due);
+  // An object without a shape is said to have none, and not taken for another.
+  Hello bare;
+  bare.objects.resize(1);
+  CHECK(bare.members() == R"("input":"objects","objects":[{"shape":null,"friction":0}])");
 }
 
 static void messages() {
@@ -223,6 +244,7 @@ int main() {
   pieces();
   numbers();
   hellos();
+  typed_hellos();
   halves();
   json();
   messages();

@@ -74,6 +74,8 @@ namespace Papilla
         public float[] PressurePa;
         /// <summary>The traction along the skin (Pa), x y z a vertex in the finger's frame; null where the hello does not ask for it.</summary>
         public float[] ShearPa;
+        /// <summary>How far the skin has moved (mm), x y z a vertex in the finger's frame; null where the hello does not ask for it.</summary>
+        public float[] DisplacementMm;
         /// <summary>Who fired since the answer before, in the order of time: the first SpikeCount; null without the effect <c>spikes</c>.</summary>
         public Spike[] Spikes;
         public int SpikeCount;
@@ -177,6 +179,8 @@ namespace Papilla
             Copy(m, terms.PressureAt, terms.PressureCount, bytes, PressurePa);
             ShearPa = Sized(ShearPa, terms.ShearCount);
             Copy(m, terms.ShearAt, terms.ShearCount, bytes, ShearPa);
+            DisplacementMm = Sized(DisplacementMm, terms.DisplacementCount);
+            Copy(m, terms.DisplacementAt, terms.DisplacementCount, bytes, DisplacementMm);
             var type = (SampleType)m[6];
             Vertices = Sized(Vertices, type > SampleType.U8 ? 0 : terms.VerticesBytes / Wire.Bytes(type));
             if (Vertices == null) return;

@@ -1,62 +1,41 @@
-using System.Collections.Generic;
 using Newtonsoft.Json.Linq;
 
 namespace Papilla
 {
-    /// <summary>What a session asks for; null members take the server's default. See docs/reference/protocol-hello.md.</summary>
-    public sealed class Hello
+    /// <summary>
+    /// What a session asks for, said in its first message. Members that are not set take the service's default, and so does
+    /// what <see cref="Members"/> does not name.
+    /// </summary>
+    public sealed partial class Hello
     {
-        /// <summary>Tier by name; null: the server's choice.</summary>
-        public string Tier;
-        /// <summary>Time a frame may spend in the server, us.</summary>
-        public uint? BudgetUs;
-        public SampleType SampleType = SampleType.F32;
-        public SampleType? AnswerSampleType;
-        /// <summary>Pa per unit of u16 and u8 samples; 0: each frame has its own.</summary>
-        public float PressureScalePa;
-        /// <summary>Effects of the tier and of the session, by name.</summary>
-        public readonly List<string> Effects = new List<string>();
-        /// <summary>
-        /// Other members as on the wire: <c>contact_pa</c>, <c>out_of_range</c>, <c>stale_after_us</c>, <c>atlas_hash</c>, <c>map</c>, the
-        /// parameters of effects, <c>input</c>, <c>objects</c>, <c>fingers</c>, ...
-        /// </summary>
+        /// <summary>Members that this client does not know, as on the wire; they are said last, and so replace those of the same name.</summary>
         public readonly JObject Members = new JObject();
 
-        /// <summary>A hello from its members on the wire, without type and version.</summary>
-        public static Hello FromJson(JObject json)
+        /// <summary>All members as on the wire, without type and version.</summary>
+        public JObject ToJson()
         {
-            var hello = new Hello();
-            foreach (var member in json)
+            var json = new JObject();
+            if (Input == null && Objects.Count > 0) json["input"] = "objects";
+            Write(json);
+            if (Effects.Count > 0) json["effects"] = Words.Of(Effects, effect => (JToken)effect.Name);
+            foreach (var effect in Effects)
             {
-                switch (member.Key)
-                {
-                    case "tier": hello.Tier = (string)member.Value; break;
-                    case "budget_us": hello.BudgetUs = (uint?)member.Value; break;
-                    case "sample_type": hello.SampleType = Wire.Parse((string)member.Value); break;
-                    case "pressure_scale_pa": hello.PressureScalePa = (float?)member.Value ?? 0; break;
-                    case "answer_sample_type": hello.AnswerSampleType = Wire.Parse((string)member.Value); break;
-                    case "effects": foreach (var effect in member.Value) hello.Effects.Add((string)effect); break;
-                    default: hello.Members[member.Key] = member.Value.DeepClone(); break;
-                }
+                var parameters = effect.Parameters();
+                if (parameters != null) json[effect.Name] = parameters;
             }
-            return hello;
+            foreach (var member in Members) json[member.Key] = member.Value.DeepClone();
+            return json;
         }
 
         /// <param name="follows">the session moves to another connection when it is asked to</param>
         /// <param name="resumes">what the service remembers is the next message</param>
         internal string ToText(bool follows, bool resumes = false)
         {
-            var json = (JObject)Members.DeepClone();
+            var json = ToJson();
             json["type"] = "hello";
             json["version"] = Wire.Version;
-            json["effects"] = new JArray(Effects);
-            json["sample_type"] = SampleType.ToString().ToLowerInvariant();
             if (follows) json["reconnect"] = true;
             if (resumes) json["resume"] = true;
-            if (Tier != null) json["tier"] = Tier;
-            if (BudgetUs != null) json["budget_us"] = BudgetUs;
-            if (PressureScalePa > 0) json["pressure_scale_pa"] = PressureScalePa;
-            if (AnswerSampleType != null) json["answer_sample_type"] = AnswerSampleType.ToString().ToLowerInvariant();
             return json.ToString(Newtonsoft.Json.Formatting.None);
         }
     }
@@ -73,7 +52,7 @@ namespace Papilla
         public readonly float PressureMaxPa;
         /// <summary>All members, as on the wire.</summary>
         public readonly JObject Json;
-        internal readonly int ErrorEstimateAt = -1, TouchAt = -1, PressureAt = -1, PressureCount, ShearAt = -1, ShearCount, SpikesAt = -1, SpikesBytes, VerticesAt = -1, VerticesBytes, RatesAt = -1, RatesBytes;
+        internal readonly int ErrorEstimateAt = -1, TouchAt = -1, PressureAt = -1, PressureCount, ShearAt = -1, ShearCount, DisplacementAt = -1, DisplacementCount, SpikesAt = -1, SpikesBytes, VerticesAt = -1, VerticesBytes, RatesAt = -1, RatesBytes;
         internal readonly int SummaryAt = -1, PointsAt = -1, PointsCount, PointRatesAt = -1, PointRatesCount, ActuatorsAt = -1, ActuatorsCount, MapAt = -1;
 
         internal Ready(JObject json)
@@ -93,6 +72,7 @@ namespace Papilla
                     case "touch": TouchAt = at; break;
                     case "pressure": PressureAt = at; PressureCount = bytes / 4; break;
                     case "shear": ShearAt = at; ShearCount = bytes / 4; break;
+                    case "displacement": DisplacementAt = at; DisplacementCount = bytes / 4; break;
                     case "error_estimate": ErrorEstimateAt = at; break;
                     case "spikes": SpikesAt = at; SpikesBytes = bytes; break;
                     case "vertices": VerticesAt = at; VerticesBytes = bytes; break;

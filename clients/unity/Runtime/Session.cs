@@ -202,7 +202,7 @@ namespace Papilla
             Handed handed;
             lock (gate)
             {
-                draft.Encode(values, 0, width, column, row, width, height, hello.SampleType, hello.PressureScalePa);
+                draft.Encode(values, 0, width, column, row, width, height, hello.SampleType, (float)(hello.PressureScalePa ?? 0));
                 handed = HandOver(0, timeUs);
             }
             return Told(handed);

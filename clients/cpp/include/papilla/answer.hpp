@@ -74,6 +74,7 @@ struct Answer {
   Touch touch;                        ///< of poses and of gaps
   std::vector<float> pressure_pa;     ///< that was found, if asked for: a map, or a value a vertex
   std::vector<float> shear_pa;        ///< traction along the skin, x y z a vertex in the finger's frame, if asked for
+  std::vector<float> displacement_mm; ///< how far the skin has moved, x y z a vertex in the finger's frame, if asked for
   std::vector<float> vertices;        ///< SED at the atlas' vertices, if asked for in place of a map
   ErrorEstimate error_estimate;
   bool has_summary = false;
@@ -95,7 +96,7 @@ struct Answer {
     spikes.clear();
     spikes_total = 0;
     for (auto* const list :
-         {&values, &pressure_pa, &shear_pa, &vertices, &rates_hz, &points, &point_rates_hz, &actuators}) {
+         {&values, &pressure_pa, &shear_pa, &displacement_mm, &vertices, &rates_hz, &points, &point_rates_hz, &actuators}) {
       list->clear();
     }
   }
@@ -144,13 +145,14 @@ struct Ready {
   std::uint64_t tier_number = 0;
   float pressure_max_pa = 0.0F;
   std::string atlas_hash;
-  Section touch, pressure, shear, error_estimate, vertices, summary, rates, points, point_rates, actuators, spikes, map;
+  Section touch, pressure, shear, displacement, error_estimate, vertices, summary, rates, points, point_rates, actuators, spikes, map;
 
   /// The section of that name; null if there is no such section.
   Section* section(std::string_view name) {
     return name == "touch"         ? &touch
            : name == "pressure"    ? &pressure
            : name == "shear"       ? &shear
+           : name == "displacement" ? &displacement
            : name == "error_estimate" ? &error_estimate
            : name == "vertices"    ? &vertices
            : name == "summary"     ? &summary

@@ -276,6 +276,7 @@ class Core {
     scratch_.values.reserve(map_len);
     scratch_.pressure_pa.reserve(ready.pressure.bytes / 4);
     scratch_.shear_pa.reserve(ready.shear.bytes / 4);
+    scratch_.displacement_mm.reserve(ready.displacement.bytes / 4);
     scratch_.spikes.reserve(ready.spikes.bytes / spike_bytes);
     scratch_.vertices.reserve(ready.vertices.bytes);
     scratch_.rates_hz.reserve(ready.rates.bytes);
@@ -321,6 +322,8 @@ class Core {
     if (!floats(ready.pressure, answer.pressure_pa.data())) return false;
     answer.shear_pa.resize(ready.shear.bytes / 4);
     if (!floats(ready.shear, answer.shear_pa.data())) return false;
+    answer.displacement_mm.resize(ready.displacement.bytes / 4);
+    if (!floats(ready.displacement, answer.displacement_mm.data())) return false;
     answer.error_estimate = {};
     if (ready.error_estimate.there) {
       std::array<float, 4> errors{};

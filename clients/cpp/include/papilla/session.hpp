@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core.hpp"
+#include "hello.hpp"
 #include "websocket.hpp"
 
 namespace papilla {
@@ -23,8 +24,8 @@ class Session {
   struct Options {
     std::string url = "127.0.0.1:7224";  ///< host, host:port or a URL; see net::Address
     std::string token;                ///< bearer token, if the service asks for one; blanks around it go
-    /// Members of the protocol's hello as JSON without braces: "\"tier\": \"small\"".
-    std::string hello;
+    /// What to ask for.
+    Hello hello;
     /// Called with every outcome, from the session's threads or from `send`, under its lock: copy
     /// what is needed and return.
     std::function<void(const Answer&)> on_answer;
@@ -41,7 +42,7 @@ class Session {
 
   Session() : Session(Options()) {}
   explicit Session(Options options)
-      : options_(std::move(options)), address_(net::Address::of(options_.url)), core_(Core::following(options_.hello)) {
+      : options_(std::move(options)), address_(net::Address::of(options_.url)), core_(Core::following(options_.hello.members())) {
     core_.on_answer = [this](const Answer& answer) { outcome(answer); };
     core_.on_warning = options_.warn;
   }
@@ -53,7 +54,7 @@ class Session {
   bool open() {
     if (!address_.fault.empty()) return problem_ = {"bad_address", address_.fault, ""}, false;
     if (!net::clean_token(options_.token)) return problem_ = bad_token(), false;
-    if (!Core::is_readable(options_.hello, problem_) || !connect()) return false;
+    if (!Core::is_readable(options_.hello.members(), problem_) || !connect()) return false;
     reader_ = std::thread([this] { live(); });
     writer_ = std::thread([this] { write(); });
     watcher_ = std::thread([this] { watch(); });
@@ -139,11 +140,11 @@ class Session {
   }
 
   /// Says hello again in the open session; false: `problem()` says why not, and the old terms stand.
-  bool renew(const std::string& hello, int timeout_ms = 30000) {
+  bool renew(const Hello& hello, int timeout_ms = 30000) {
     std::unique_lock<std::mutex> lock(mutex_);
     if (!core_.is_ready()) return problem_ = {"", "there is no session just now", ""}, false;
-    if (!Core::is_readable(hello, problem_)) return false;
-    const std::string members = Core::following(hello);
+    if (!Core::is_readable(hello.members(), problem_)) return false;
+    const std::string members = Core::following(hello.members());
     new_hello_ = Core::hello_text(members);
     is_answered_ = is_granted_ = false;
     changed_.notify_all();

@@ -16,7 +16,7 @@ func _init():
 	var count = int(float(OS.get_environment("DURATION_S")) * rate_hz) + WARM
 	var session = Session.new()
 	session.url = OS.get_environment("PAPILLA_URL")
-	session.hello = {"tier": "half-space"}
+	session.hello = preload("res://addons/papilla/hello.gd").new().with({"tier": "half-space"})
 	session.connect("answered", self, "_on_answered")
 	session.open()
 	while session.server_ready == null:

@@ -5,6 +5,7 @@ const Session = preload("res://addons/papilla/session.gd")
 const Address = preload("res://addons/papilla/address.gd")
 const Atlas = preload("res://addons/papilla/atlas.gd")
 const Http = preload("res://addons/papilla/http.gd")
+const Typed = preload("res://test/typed.gd")
 const Patterns = preload("res://test/patterns.gd")
 const Frames = preload("res://addons/papilla/frames.gd")
 
@@ -154,17 +155,22 @@ func refused_with(address, token, code):
 
 func step_hello(step, expect):
 	reply = null
+	var typed = Typed.new()
+	var hello = typed.hello_of(step.hello)
+	if typed.fault != "":
+		fail(typed.fault)
+		return
 	if session == null:
 		session = Session.new()
 		session.url = url
-		session.hello = step.hello
+		session.hello = hello
 		session.timeout_ms = patience_ms
 		session.connect("answered", self, "on_answered")
 		session.connect("session_ready", self, "on_session_ready")
 		session.connect("refused", self, "on_refused")
 		session.open()
 	else:
-		session.renew(step.hello)
+		session.renew(hello)
 	if not wait_for("has_reply"):
 		return
 	if expect.get("status") == "error":

@@ -14,7 +14,7 @@ func _initialize():
 	if path.ends_with(".tscn"):
 		_node = load(path).instance()
 		_node.get_node("Session").url = _url
-		_node.get_node("Session").hello = {"tier": "half-space"}
+		_node.get_node("Session").hello = preload("res://addons/papilla/hello.gd").new().with({"tier": "half-space"})
 		_node.get_node("Session").connect("map_received", self, "_on_map")
 	else:
 		_node = Node.new()

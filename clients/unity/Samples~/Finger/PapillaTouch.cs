@@ -1,4 +1,3 @@
-using Newtonsoft.Json.Linq;
 using Papilla;
 using UnityEngine;
 
@@ -17,8 +16,7 @@ public sealed class PapillaTouch : MonoBehaviour
 
     void Start()
     {
-        var shape = new JObject { ["shape"] = "sphere", ["radius_mm"] = radiusMm };
-        var hello = Hello.FromJson(new JObject { ["input"] = "objects", ["objects"] = new JArray(new JObject { ["shape"] = shape }), ["map"] = false });
+        var hello = new Hello { Objects = { new TouchObject { Shape = new SphereShape { RadiusMm = radiusMm } } }, Map = false };
         session = new Session(address, hello).Open();
     }
 

@@ -37,8 +37,8 @@ const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_lim
 @export var url := "http://127.0.0.1:7224"
 # Bearer token, for a server that asks for one; blanks around it go.
 @export var token := ""
-# What to ask for, as in docs/reference/protocol-hello.md: {"tier": "nano", "effects": ["summary"], ...}. Type and version are added.
-@export var hello := {}
+# What to ask for: a `Hello` of hello.gd; null: what the service gives without a wish. Set it before the node enters the tree, or before `open`.
+var hello = null
 # Connect when the scene starts.
 @export var auto_open := true
 # Frames of a finger that may be without an answer. Two fill the server (one rendered, one waiting); more only help over slow networks.
@@ -100,7 +100,7 @@ func _exit_tree():
 func open():
 	_open = true
 	_is_refused = false
-	_asked = hello.duplicate(true)
+	_asked = {} if hello == null else hello.words()
 	if not _fault():
 		_connect()
 
@@ -112,7 +112,7 @@ func close():
 	_end_waiting("lost")
 
 
-# Says hello again in the open session: `session_ready`, or `refused` and the old terms stand.
+# Says another hello in the open session: `session_ready`, or `refused` and the old terms stand.
 func renew(next):
 	_end_waiting("superseded")
 	if server_ready != null:
@@ -120,7 +120,7 @@ func renew(next):
 	if _move != null and _move.holds():
 		# What is sealed is of the old terms.
 		_move.put_off(Time.get_ticks_msec())
-	_asked = next.duplicate(true)
+	_asked = next.words()
 	_renewed_from = _sequence + 1
 	server_ready = null
 	if _link != null and _link.is_open():
