@@ -65,7 +65,8 @@ void UPapillaSessionComponent::BeginPlay()
     Drawn.SetNumZeroed(static_cast<int32>(papilla::map_len));
     papilla::Problem Problem;
     Address = papilla::net::Address::of(ToUtf8(Server));
-    bool bIsGood = papilla::Core::is_readable(ToUtf8(Hello), Problem);
+    const std::string Members = Hello.ToCore().members();
+    bool bIsGood = papilla::Core::is_readable(Members, Problem);
     if (!Address.fault.empty())
     {
         Problem = {"bad_address", Address.fault, "Server"};
@@ -83,7 +84,7 @@ void UPapillaSessionComponent::BeginPlay()
         OnRefused.Broadcast(ToFString(Problem.code), ToFString(Problem.message));
         return;
     }
-    Core = MakeUnique<papilla::Core>(papilla::Core::following(ToUtf8(Hello)));
+    Core = MakeUnique<papilla::Core>(papilla::Core::following(Members));
     Core->on_warning = [](const std::string& Words)
     {
         UE_LOG(LogTemp, Warning, TEXT("Papilla: %s"), *ToFString(Words));
@@ -396,6 +397,27 @@ bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const
         {
             SedJPerM3[Row * papilla::side_px + Column] = Answer.at(Row, Column);
         }
+    }
+    return true;
+}
+
+bool UPapillaSessionComponent::GetSedAtVertices(TArray<float>& SedJPerM3) const
+{
+    const int32 Count = bHasAnswer ? static_cast<int32>(Answer.vertices.size()) : 0;
+    SedJPerM3.SetNumUninitialized(Count);
+    if (Count > 0) FMemory::Memcpy(SedJPerM3.GetData(), Answer.vertices.data(), Count * sizeof(float));
+    return Count > 0;
+}
+
+bool UPapillaSessionComponent::GetSkin(TArray<FVector>& Vertices, TArray<int32>& Triangles) const
+{
+    if (!bHasAtlas) return false;
+    Vertices.Reset();
+    Triangles.Reset();
+    for (const std::array<double, 3>& At : Atlas.positions_mm) Vertices.Add(UPapillaFrames::Drawn(FVector(At[0], At[1], At[2])));
+    for (const std::array<std::uint32_t, 3>& Corners : Atlas.triangles)
+    {
+        for (const std::uint32_t Corner : Corners) Triangles.Add(static_cast<int32>(Corner));
     }
     return true;
 }

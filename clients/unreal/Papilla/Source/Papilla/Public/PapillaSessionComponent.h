@@ -3,6 +3,7 @@
 
 #include "Components/ActorComponent.h"
 #include "CoreMinimal.h"
+#include "PapillaHello.h"
 
 #include <papilla/address.hpp>
 #include <papilla/atlas.hpp>
@@ -83,9 +84,9 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
     FString Token;
 
-    /** Members of the protocol's hello, as JSON without braces: "tier": "small", "effects": ["summary"]. */
+    /** What to ask for. It is said when play begins. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
-    FString Hello = TEXT("\"budget_us\": 11000");
+    FPapillaHello Hello;
 
     /** Frames of a finger that may be on their way at once. IWebSocket queues without bound, so this bounds it. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (ClampMin = "1", ClampMax = "8"))
@@ -153,6 +154,14 @@ public:
     /** The newest answer's map, 224 x 224, J/m3; false if it has none, or none came yet. */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
     bool GetSed(TArray<float>& SedJPerM3) const;
+
+    /** SED at the atlas' vertices, J/m3, of the newest answer; false if the hello does not ask for it there, or none came yet. */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    bool GetSedAtVertices(TArray<float>& SedJPerM3) const;
+
+    /** The finger's skin to draw: its vertices in the drawn finger's own axes, cm, and its triangles; false before the atlas has come. */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    bool GetSkin(TArray<FVector>& Vertices, TArray<int32>& Triangles) const;
 
     /** The newest answer with all it carries: summary, points, actuators, times. */
     const papilla::Answer& Latest() const { return Answer; }

@@ -1,0 +1,6 @@
+#pragma once
+#include "GameFramework/Actor.h"
+struct AGameModeBase : AActor {
+  using Super = AGameModeBase;
+  virtual void StartPlay() {}
+};

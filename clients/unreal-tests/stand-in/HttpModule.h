@@ -1,0 +1,6 @@
+#pragma once
+#include "Interfaces/IHttpRequest.h"
+struct FHttpModule {
+  static FHttpModule& Get();
+  FHttpRequestPtr CreateRequest();
+};
