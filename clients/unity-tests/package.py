@@ -2,7 +2,7 @@
 """Checks a folder as Unity's package manager takes it from a git URL: package.py FOLDER.
 
 Unity itself is not here. What it asks for: package.json with name and version, an assembly definition for
-scripts, samples that exist, and one .meta file with a GUID of its own for each file and folder that it
+scripts, samples that exist with a scene whose references lead somewhere, and one .meta file with a GUID of its own for each file and folder that it
 imports (a package from git is read-only, so Unity cannot write a missing one and leaves the file out).
 """
 
@@ -21,6 +21,51 @@ def imported(folder: Path) -> list[Path]:
     return sorted(p for p in both if not any(n.startswith(".") or n.endswith("~") for n in p.parts))
 
 
+# Meshes and materials that Unity has within itself.
+BUILT_IN = {"0000000000000000e000000000000000", "0000000000000000f000000000000000"}
+
+
+def guids_of(folder: Path) -> dict[str, Path]:
+    """Files below a folder by the GUID of their meta files."""
+    found = {}
+    for meta in folder.rglob("*.meta"):
+        guid = re.search(r"^guid: ([0-9a-f]{32})$", meta.read_text(), re.M)
+        if guid:
+            found[guid[1]] = meta.with_suffix("")
+    return found
+
+
+def sample_faults(sample: Path, package: Path) -> list[str]:
+    """What of a sample's scene, materials and scripts leads nowhere once the sample lies in a project."""
+    files = [path for path in sample.rglob("*") if path.is_file() and path.suffix != ".meta"]
+    found = [f"{path}: no meta file" for path in files if not path.with_name(path.name + ".meta").is_file()]
+    found += [] if any(path.suffix == ".unity" for path in files) else [f"{sample}: no scene"]
+    known = guids_of(package / "Runtime") | guids_of(sample)
+    if len(guids_of(sample)) != len(files):
+        found.append(f"{sample}: two files have one GUID")
+    for path in (p for p in files if p.suffix in (".unity", ".mat")):
+        text = path.read_text()
+        found += [f"{path}: there is no {guid}" for guid in set(re.findall(r"guid: ([0-9a-f]{32})", text)) - set(known) - BUILT_IN]
+        objects = re.findall(r"^--- !u!\d+ &(\d+)$", text, re.M)
+        if len(set(objects)) != text.count("\n--- "):
+            found.append(f"{path}: an object's number is used twice, or cannot be read")
+        found += [f"{path}: there is no object {i}" for i in set(re.findall(r"\{fileID: (\d+)\}", text)) - set(objects) - {"0"}]
+        for block in text.split("\n--- ")[1:]:
+            script = re.search(r"m_Script: \{fileID: 11500000, guid: ([0-9a-f]{32}), type: 3\}", block)
+            if script and script[1] in known:
+                found += script_faults(path, block, known[script[1]])
+    return found
+
+
+def script_faults(scene: Path, block: str, script: Path) -> list[str]:
+    """Unity finds a script's class by the name of its file, and fills its fields by their names."""
+    code = script.read_text()
+    found = [] if re.search(rf"class {script.stem} : MonoBehaviour", code) else [f"{script}: no class {script.stem}"]
+    fields = set(re.findall(r"\[SerializeField\] [\w.\[\]]+ (\w+)", code))
+    said = {name for name in re.findall(r"^  (\w+):", block, re.M) if not name.startswith("m_")}
+    return found + [f"{scene}: {script.name} and the scene differ in {', '.join(sorted(fields ^ said))}"] if fields != said else found
+
+
 def faults(folder: Path) -> list[str]:
     found = []
     package = json.loads((folder / "package.json").read_text())
@@ -31,6 +76,7 @@ def faults(folder: Path) -> list[str]:
     for sample in package.get("samples", []):
         if not any((folder / sample["path"]).glob("*.cs")):
             found.append(f"sample {sample['displayName']}: no script in {sample['path']}")
+        found += sample_faults(folder / sample["path"], folder)
     paths = imported(folder)
     metas = {p for p in paths if p.suffix == ".meta"}
     guids: dict[str, Path] = {}
