@@ -223,11 +223,18 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             },
         );
         let is_default = index == catalogue.default;
-        let default = if is_default { ", the default" } else { "" };
+        let is_for_pressure = index == catalogue.default_for_pressure;
+        let default = match (is_default, is_for_pressure) {
+            (true, true) => ", the default",
+            (true, false) => ", the default for poses and gaps",
+            (false, true) => ", the default for pressure",
+            (false, false) => "",
+        };
         let on_demand = if tier.on_demand { ", loaded when it is named" } else { "" };
         let values = json!({
             "tier": tier.name,
             "default": is_default,
+            "default_for_pressure": is_for_pressure,
             "on_demand": tier.on_demand,
             "onnx_sha256": tier.onnx_sha256,
             "atlas_hash": tier.atlas_hash,

@@ -53,6 +53,36 @@ pub struct Card {
     pub onnxruntime_difference_max: Option<f64>,
 }
 
+/// Which pressure a network learnt from.
+///
+/// The service's own contact methods err, and not by chance. From their pressure a network that
+/// learnt it answers nearer to the SED of finite elements (FE) than one that learnt FE's pressure,
+/// and the other way round; one that learnt both lies between the two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Learnt {
+    /// The pressure of the simulations alone.
+    Fe,
+    /// What the contact methods find for the same poses, alone.
+    Contact,
+    /// Both.
+    Both,
+}
+
+impl Learnt {
+    /// Whether it learnt the pressure of contact methods.
+    #[must_use]
+    pub fn knows_contact(self) -> bool {
+        self != Self::Fe
+    }
+
+    /// Whether it learnt the pressure of the simulations.
+    #[must_use]
+    pub fn knows_fe(self) -> bool {
+        self != Self::Contact
+    }
+}
+
 /// Accuracy over the samples of a split. All but SSIM are errors, relative, without unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -149,11 +179,15 @@ impl Card {
         crate::info::datasets(&self.dataset_sha256, &self.training)
     }
 
-    /// Whether its training included pressure from the service's own contact methods, beside FE
-    /// pressure.
+    /// Which pressure it learnt from.
     #[must_use]
-    pub fn knows_contact(&self) -> bool {
-        self.training.get("contact").is_some()
+    pub fn learnt(&self) -> Learnt {
+        let is_alone = self.training.get("contact_alone") == Some(&Value::Bool(true));
+        match self.training.get("contact") {
+            None => Learnt::Fe,
+            Some(_) if is_alone => Learnt::Contact,
+            Some(_) => Learnt::Both,
+        }
     }
 
     /// Hash of dimensions and tissues of the finger whose simulations trained it; None: the default
@@ -212,6 +246,10 @@ impl Card {
 pub struct Index {
     /// The default model; one of `models`.
     pub default: String,
+    /// The default for clients that give pressure, not poses or gaps; one of `models`. None: the
+    /// same as for the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub default_for_pressure: Option<String>,
     /// Names of all models; each has `NAME.onnx` and `NAME.json` beside the index.
     pub models: Vec<String>,
     /// Those of `models` that a service loads when a client first names them; no budget picks them.
@@ -239,14 +277,31 @@ impl Index {
     }
 
     fn fault(&self) -> Option<String> {
-        let Self { default, models, on_demand, .. } = self;
-        if !models.contains(default) {
-            return Some(format!("the default '{default}' is not in 'models'"));
+        let Self { models, on_demand, .. } = self;
+        for (member, default) in self.defaults() {
+            if !models.contains(default) {
+                return Some(format!("'{default}' of '{member}' is not in 'models'"));
+            }
+            if on_demand.contains(default) {
+                return Some(format!(
+                    "'{default}' of '{member}' is in 'on_demand'; take it out of there"
+                ));
+            }
         }
-        if let Some(stranger) = on_demand.iter().find(|name| !models.contains(name)) {
-            return Some(format!("'{stranger}' of 'on_demand' is not in 'models'"));
-        }
-        let is_late = on_demand.contains(default);
-        is_late.then(|| format!("the default '{default}' is in 'on_demand'; take it out of there"))
+        let stranger = on_demand.iter().find(|name| !models.contains(name));
+        stranger.map(|name| format!("'{name}' of 'on_demand' is not in 'models'"))
+    }
+
+    /// The models that answer clients who name none, with the members that name them.
+    pub fn defaults(&self) -> impl Iterator<Item = (&'static str, &String)> {
+        let for_pressure =
+            self.default_for_pressure.iter().map(|name| ("default_for_pressure", name));
+        std::iter::once(("default", &self.default)).chain(for_pressure)
+    }
+
+    /// The model for clients who name none and give pressure.
+    #[must_use]
+    pub fn default_for_pressure(&self) -> &str {
+        self.default_for_pressure.as_ref().unwrap_or(&self.default)
     }
 }

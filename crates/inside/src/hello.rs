@@ -1,11 +1,13 @@
 //! What a session asks for: the protocol's hello, as far as it has a meaning without a service.
 
+use std::sync::Arc;
+
 use papilla_proto::{
     ClientMessage, ErrorCode, Hello, Problem, RuntimeEffect, contact::DEFAULT_FINGER,
     error::shortened,
 };
 
-use crate::Model;
+use crate::{Model, Network};
 
 /// Reads the text of a hello.
 ///
@@ -51,14 +53,18 @@ pub(crate) fn check_form(hello: &Hello) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Holds a hello against the model that was loaded.
-pub(crate) fn check_model(hello: &Hello, model: &Model) -> Result<(), Problem> {
-    let info = model.network.info();
-    let name = &info.name;
-    if let Some(tier) = hello.tier.as_ref().filter(|&tier| tier != name) {
-        let message = format!("no tier '{}'; '{name}' was loaded", shortened(tier));
+/// Holds a hello against the networks that were loaded; the one that it gets.
+pub(crate) fn choose(hello: &Hello, model: &Model) -> Result<Arc<Network>, Problem> {
+    let input = hello.input.unwrap_or_default();
+    let Some(network) = model.chosen(hello.tier.as_deref(), input) else {
+        let tier = shortened(hello.tier.as_deref().unwrap_or_default());
+        let names: Vec<String> = model.networks().map(|of| format!("'{}'", of.card.name)).collect();
+        let were = if names.len() == 1 { "was" } else { "were" };
+        let message = format!("no tier '{tier}'; {} {were} loaded", names.join(" and "));
         return Err(Problem::new(ErrorCode::UnknownTier, message).at("tier"));
-    }
+    };
+    let info = network.model.info();
+    let name = &info.name;
     let is_foreign = |e: &&String| e.parse::<RuntimeEffect>().is_err() && !info.effects.contains(e);
     if let Some(effect) = hello.effects.iter().find(is_foreign) {
         let (effect, rendered) = (shortened(effect), info.effects.join(", "));
@@ -70,5 +76,5 @@ pub(crate) fn check_model(hello: &Hello, model: &Model) -> Result<(), Problem> {
         let message = format!("the program has atlas {hash}, tier {name} has {ours}");
         return Err(Problem::new(ErrorCode::AtlasMismatch, message).at("atlas_hash"));
     }
-    Ok(())
+    Ok(Arc::clone(network))
 }

@@ -33,6 +33,6 @@ pub use contact::{Contact, Solved};
 pub use feel::Feel;
 pub use folder::LoadError;
 pub use hello::read_hello;
-pub use model::Model;
+pub use model::{Model, Network};
 pub use papilla_proto::Problem;
 pub use session::{Frame, Made, Session};

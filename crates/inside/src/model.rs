@@ -1,4 +1,4 @@
-//! A folder of models: a finger and one network.
+//! A folder of models: a finger, and the network for it.
 
 use std::{
     path::{Path, PathBuf},
@@ -6,7 +6,10 @@ use std::{
 };
 
 use papilla_engine::{Card, card::Index, error_law::ErrorLaws};
-use papilla_proto::atlas::{AtlasError, Patch, Raster};
+use papilla_proto::{
+    atlas::{AtlasError, Patch, Raster},
+    contact::Input,
+};
 use papilla_session_effects as effects;
 
 use crate::{
@@ -20,23 +23,41 @@ pub struct Model {
     pub bundle: Arc<Bundle>,
     pub(crate) interface: Raster,
     pub(crate) shared: effects::Shared,
-    /// The network.
-    pub network: Arc<dyn papilla_engine::Model>,
-    /// What is known of the network.
-    pub card: Card,
+    network: Arc<Network>,
+    for_pressure: Arc<Network>,
     /// By what the errors of answers are told; none: the folder has no `errors.json`.
     pub(crate) error_laws: Option<ErrorLaws>,
 }
 
+/// A network, and what is known of it.
+pub struct Network {
+    /// Runs it.
+    pub model: Arc<dyn papilla_engine::Model>,
+    /// Its card.
+    pub card: Card,
+}
+
+impl Network {
+    fn read(folder: &Path, name: &str) -> Result<Self, LoadError> {
+        let (file, json) = read_text(folder.join(format!("{name}.json")))?;
+        let card = Card::from_json(&json).map_err(|source| LoadError::Engine { file, source })?;
+        let (file, onnx) = read(folder.join(format!("{name}.onnx")))?;
+        let model = papilla_engine::load(&onnx, Some(&card))
+            .map_err(|source| LoadError::Engine { file, source })?;
+        Ok(Self { model, card })
+    }
+}
+
 impl std::fmt::Debug for Model {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Model").field("name", &self.card.name).finish_non_exhaustive()
+        f.debug_struct("Model").field("name", &self.network.card.name).finish_non_exhaustive()
     }
 }
 
 impl Model {
-    /// Reads a network of a folder, the index's default without a name, and a contact model.
-    /// Everything is checked as the service does it; the network runs once.
+    /// Reads a network of a folder and a contact model. Without a name these are the networks that a
+    /// service takes for a client who names none: the index's default, and its default for pressure.
+    /// Everything is checked as the service does it; each network runs once.
     ///
     /// # Errors
     /// A file is missing, damaged, or of another atlas.
@@ -55,17 +76,43 @@ impl Model {
             let known = index.models.join(", ");
             return Err(LoadError::Unknown { file, name: name.to_owned(), known });
         }
-        let (file, json) = read_text(folder.join(format!("{name}.json")))?;
-        let card = Card::from_json(&json).map_err(|source| LoadError::Engine { file, source })?;
-        let (file, onnx) = read(folder.join(format!("{name}.onnx")))?;
-        let network = papilla_engine::load(&onnx, Some(&card))
-            .map_err(|source| LoadError::Engine { file, source })?;
-        let hash = &network.info().atlas_hash;
+        let network = Arc::new(Network::read(folder, name)?);
+        let for_pressure = tier.unwrap_or_else(|| index.default_for_pressure());
+        let for_pressure = if for_pressure == name {
+            Arc::clone(&network)
+        } else {
+            Arc::new(Network::read(folder, for_pressure)?)
+        };
+        let hash = &network.model.info().atlas_hash;
         let bundle = Arc::new(Bundle::read(folder, contact, Some(hash))?);
         let interface = Raster::new(&bundle.atlas, Patch::Interface);
         let error_laws = read_error_laws(folder.join("errors.json"), hash)?;
         let shared = effects::Shared::default();
-        Ok(Self { bundle, interface, shared, network, card, error_laws })
+        Ok(Self { bundle, interface, shared, network, for_pressure, error_laws })
+    }
+
+    /// The network for frames that hold this.
+    #[must_use]
+    pub fn network_for(&self, input: Input) -> &Arc<Network> {
+        match input {
+            Input::Pressure => &self.for_pressure,
+            Input::Gaps | Input::Objects => &self.network,
+        }
+    }
+
+    /// The networks that were loaded, each once.
+    pub fn networks(&self) -> impl Iterator<Item = &Arc<Network>> {
+        let is_other = !Arc::ptr_eq(&self.network, &self.for_pressure);
+        std::iter::once(&self.network).chain(is_other.then_some(&self.for_pressure))
+    }
+
+    /// The network on the terms of a hello: the one that it names, or else the one for its frames.
+    /// None: it names another.
+    pub(crate) fn chosen(&self, tier: Option<&str>, input: Input) -> Option<&Arc<Network>> {
+        match tier {
+            None => Some(self.network_for(input)),
+            Some(name) => self.networks().find(|network| network.card.name == name),
+        }
     }
 
     /// Draws values at the vertices of the skin as a map.

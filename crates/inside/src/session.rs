@@ -19,11 +19,13 @@ use papilla_session_contact::{Finger, FrameForm, Hand};
 use papilla_session_effects as effects;
 use papilla_session_effects::Effects;
 
-use crate::{Model, hello};
+use crate::{Model, Network, hello};
 
 /// A hand, and the memory of its frames: after [`open`](Self::open) only the network allocates.
 pub struct Session {
     model: Arc<Model>,
+    /// The network that `network` is a session of.
+    of: Arc<Network>,
     network: Box<dyn papilla_engine::Session>,
     hand: Hand,
     /// Of each finger; none if the bare map is asked for.
@@ -100,7 +102,7 @@ impl Session {
     /// A member is unusable or missing; the problem names it.
     pub fn open(model: &Arc<Model>, hello: &Hello) -> Result<Self, Problem> {
         hello::check_form(hello)?;
-        hello::check_model(hello, model)?;
+        let of = hello::choose(hello, model)?;
         let Model { bundle, interface, shared, .. } = &**model;
         let hand = Hand::of(hello, bundle.skin())?;
         let (atlas, skin) = (&bundle.atlas, &bundle.raster);
@@ -109,7 +111,7 @@ impl Session {
         for _ in hand.fingers() {
             effects.extend(Effects::of(hello, finger)?);
         }
-        let mut network = model.network.session().map_err(|error| of_engine(&error))?;
+        let mut network = of.model.session().map_err(|error| of_engine(&error))?;
         let mut maps = Maps::default();
         let mut infer = Duration::ZERO;
         if effects.first().is_none_or(Effects::shows_sed) {
@@ -119,11 +121,12 @@ impl Session {
             infer = start.elapsed();
         }
         let range = PressureRange {
-            trained_max_pa: model.network.info().pressure_max_pa,
+            trained_max_pa: of.model.info().pressure_max_pa,
             beyond: hello.out_of_range.unwrap_or(OutOfRange::Clamp),
         };
         let mut session = Self {
             model: Arc::clone(model),
+            of,
             network,
             hand,
             effects,
@@ -192,8 +195,8 @@ impl Session {
     /// What the session agreed to, as a service says it. Latency is that of one run of the network.
     #[must_use]
     pub fn ready(&self) -> Ready {
-        let Self { model, hand, .. } = self;
-        let info = model.network.info();
+        let Self { model, of, hand, .. } = self;
+        let info = of.model.info();
         let method = hand.method();
         let errors = model.bundle.contact_errors.as_ref();
         let effects = self.effects.first();
@@ -262,7 +265,7 @@ impl Session {
     ) -> Result<Made, Problem> {
         self.bytes.clear();
         let shows_sed = self.shows_sed();
-        let Self { model, hand, effects, maps, range, network, bytes, .. } = self;
+        let Self { model, of, hand, effects, maps, range, network, bytes, .. } = self;
         let Some(of_finger) = hand.fingers().get(finger) else {
             let fingers = hand.fingers().len();
             let message = format!("finger {finger} was not announced; there are {fingers}");
@@ -313,13 +316,13 @@ impl Session {
         let tells_error = of_finger.tells_error();
         let known = Known {
             skin: &model.bundle.pixels,
-            input_max: model.card.input_statistics_max,
-            response_max_per_mpa: model.card.response_max_per_mpa,
+            input_max: of.card.input_statistics_max,
+            response_max_per_mpa: of.card.response_max_per_mpa,
             errors: model
                 .error_laws
                 .as_ref()
                 .filter(|_| tells_error)
-                .map(|laws| KnownErrors { laws, onnx_sha256: Some(&model.card.onnx_sha256) }),
+                .map(|laws| KnownErrors { laws, onnx_sha256: Some(&of.card.onnx_sha256) }),
         };
         let read = Read { summary, range: *range, time_us, is_tracked, shows_sed, source };
         let mut rendering =
@@ -361,7 +364,7 @@ impl Session {
         if sample_type.clips(values) {
             made.flags |= flags::OUT_OF_RANGE;
         }
-        let map = Map { quantity: Quantity::Sed, values, source: &self.model.card.name };
+        let map = Map { quantity: Quantity::Sed, values, source: &self.of.card.name };
         made.scale =
             encode(Output::Samples(sample_type), map, &mut self.bytes).map_err(|error| {
                 Problem::new(ErrorCode::Internal, format!("the map cannot be encoded: {error}"))

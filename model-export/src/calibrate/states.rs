@@ -282,7 +282,9 @@ impl States {
             let case = at.case(None, Some(method));
             self.cases.push(Case { facts, is_flagged, error, ..case });
             // What learnt FE's pressure alone is not offered for contact's.
-            for network in networks.iter_mut().filter(|network| network.card.knows_contact()) {
+            for network in
+                networks.iter_mut().filter(|network| network.card.learnt().knows_contact())
+            {
                 maps.pressure_pa.copy_from_slice(&given);
                 let case = ask(at, network, &mut maps, source, &truth)?;
                 let method = Some(method);

@@ -11,9 +11,12 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Options {
     /// Folder with NAME.onnx, NAME.json and atlas.json.
     folder: PathBuf,
-    /// The model to take unasked.
+    /// The model for clients that name none.
     #[arg(long, value_name = "NAME")]
     default: String,
+    /// Another one for those of them that give pressure, not poses or gaps.
+    #[arg(long, value_name = "NAME")]
+    default_for_pressure: Option<String>,
     /// A model that the service loads when a client first names it, and that no budget picks; may
     /// be given several times.
     #[arg(long, value_name = "NAME")]
@@ -37,12 +40,13 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     // From small to large: the order in which they are offered.
     models.sort_by_key(|(bytes, name)| (*bytes, name.clone()));
     let models: Vec<String> = models.into_iter().map(|(_, name)| name).collect();
-    let named = std::iter::once(&options.default).chain(&options.on_demand);
+    let defaults = || std::iter::once(&options.default).chain(&options.default_for_pressure);
+    let named = defaults().chain(&options.on_demand);
     if let Some(stranger) = named.into_iter().find(|name| !models.contains(name)) {
         bail!("there is no model '{stranger}' in {}", options.folder.display());
     }
-    if options.on_demand.contains(&options.default) {
-        bail!("the default '{}' has to be loaded at the start", options.default);
+    if let Some(default) = defaults().find(|name| options.on_demand.contains(name)) {
+        bail!("the default '{default}' has to be loaded at the start");
     }
     // In the order of the models.
     let on_demand =
@@ -59,14 +63,17 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         }
     }
     let (default, trained_on) = (options.default.clone(), options.trained_on.clone());
-    let index = Index { default, models, on_demand, trained_on };
+    let default_for_pressure = options.default_for_pressure.clone();
+    let index = Index { default, default_for_pressure, models, on_demand, trained_on };
     let text = serde_json::to_string_pretty(&index)? + "\n";
     let path = options.folder.join("index.json");
     write(&path, text.as_bytes())?;
     if json {
         return print_json(&index);
     }
-    println!("{}: {} (default {})", path.display(), index.models.join(", "), index.default);
+    let defaults = index.defaults().map(|(member, name)| format!("{member} {name}"));
+    let defaults = defaults.collect::<Vec<_>>().join(", ");
+    println!("{}: {} ({defaults})", path.display(), index.models.join(", "));
     Ok(())
 }
 

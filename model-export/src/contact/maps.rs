@@ -4,7 +4,7 @@ use super::{Models, Placed, Rung, pixel_contact};
 use crate::ExportError;
 use crate::dataset::Dataset;
 use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Solver};
-use papilla_dataset::Split;
+use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::MAP_SIDE_PX;
 use papilla_output::{OutputError, npz::NpzBuilder};
 
@@ -39,6 +39,19 @@ impl ContactMaps {
     /// # Errors
     /// [`ExportError`] of the dataset, or where the contact model knows no pixels of it.
     pub fn of(models: &Models, dataset: &Dataset) -> Result<Self, ExportError> {
+        let [train, test] = [Split::Train, Split::Test].map(|split| dataset.indentations(split));
+        Self::of_indentations(models, dataset, train?.into_iter().chain(test?))
+    }
+
+    /// The same for some indentations, in their order.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub(crate) fn of_indentations<'a>(
+        models: &Models,
+        dataset: &'a Dataset,
+        indentations: impl IntoIterator<Item = &'a IndentationEntry>,
+    ) -> Result<Self, ExportError> {
         let mut maps = Self::default();
         let pixels = pixel_contact(models, dataset, PixelSpacing::One);
         let (Some(mut solver), Some(mut pixels)) = (models.solver(Rung::Pixels), pixels) else {
@@ -48,8 +61,7 @@ impl ContactMaps {
             return Err(ExportError::DatasetFile { path, reason: reason.to_owned() });
         };
         let mut out = Contact::new(models.finger.vertices());
-        let [train, test] = [Split::Train, Split::Test].map(|split| dataset.indentations(split));
-        for indentation in train?.into_iter().chain(test?) {
+        for indentation in indentations {
             let shard = dataset.shard(indentation)?;
             let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
             for state in 0..indentation.samples {

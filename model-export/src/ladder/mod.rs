@@ -119,6 +119,7 @@ pub fn measure(
 ) -> Result<Ladder, ExportError> {
     let canvas = Canvas::read(&task.models)?;
     let mut sets = sets::load(&task.data, &canvas)?;
+    sets.push(sets::from_poses(&task.data, &task.models, &canvas)?);
     sets.sort_by_key(|set| SET_NAMES.iter().position(|name| *name == set.name));
     if task.quick {
         for set in &mut sets {

@@ -2,13 +2,14 @@
 
 use super::Canvas;
 use crate::ExportError;
+use crate::contact::{ContactMaps, Models};
 use crate::dataset::Dataset;
 use crate::evaluate::require_same_atlas;
 use crate::part::Part;
 use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::{
     MAP_LEN,
-    ladder::{REFERENCE_SET, Set},
+    ladder::{POSES_SET, REFERENCE_SET, Set},
 };
 use papilla_proto::atlas::{Patch, Raster};
 use std::path::Path;
@@ -20,6 +21,8 @@ pub struct State {
     pub origin: String,
     /// Number of the indentation within its campaign.
     pub indentation: usize,
+    /// Number of the state within the indentation.
+    pub number: usize,
     /// Depth, mm.
     pub depth_mm: f32,
     /// Pressure on the skin, Pa.
@@ -144,6 +147,60 @@ const SOURCES: [Source; 6] = [
     },
 ];
 
+/// The sets whose presses contact presses once more, from their poses.
+const POSED: [&Source; 2] = [&SOURCES[0], &SOURCES[1]];
+
+/// The states of [`POSED`] with the pressure that contact on pixels finds from their poses in place
+/// of their own. Those that contact does not settle are left out, since the service flags them.
+/// Empty, and says why, without one of the datasets or without the contact model.
+pub(super) fn from_poses(
+    data: &Path,
+    models: &Path,
+    canvas: &Canvas,
+) -> Result<SampleSet, ExportError> {
+    let mut set = SampleSet {
+        name: POSES_SET,
+        about: String::new(),
+        dataset_sha256: None,
+        states: Vec::new(),
+    };
+    let contact = models.join("finger.contact");
+    let folders = POSED.map(|source| data.join(source.folder));
+    let missing =
+        folders.iter().map(|folder| folder.join("manifest.json")).chain([contact.clone()]);
+    if let Some(missing) = missing.into_iter().find(|file| !file.is_file()) {
+        set.about = format!("not measured: there is no {}", missing.display());
+        return Ok(set);
+    }
+    let models = Models::read(&contact)?;
+    let mut left_out = 0;
+    for (source, folder) in POSED.into_iter().zip(&folders) {
+        let dataset = Dataset::open(folder)?;
+        require_same_atlas(
+            &folder.display().to_string(),
+            dataset.atlas().hash(),
+            &canvas.atlas_hash,
+        )?;
+        models.require_atlas(&dataset, folder)?;
+        let maps =
+            ContactMaps::of_indentations(&models, &dataset, dataset.indentations(source.part)?)?;
+        left_out += maps.left_out;
+        let mut states = source.taken_of(&dataset)?.states.into_iter();
+        for (k, (press, state)) in maps.press.iter().zip(&maps.state).enumerate() {
+            let is_it = |of: &State| (of.indentation as i64, of.number as i64) == (*press, *state);
+            let Some(of) = states.by_ref().find(is_it) else { continue };
+            let map = &maps.pressure_pa[k * MAP_LEN..][..MAP_LEN];
+            let pressure_pa = canvas.skin.indices().iter().map(|&pixel| map[pixel as usize]);
+            set.states.push(State { pressure_pa: pressure_pa.collect(), ..of });
+        }
+    }
+    set.about = format!(
+        "the states of `heldout-presses` and `heldout-shapes`, with the pressure that contact on \
+         pixels finds from their poses; {left_out} that did not settle are left out"
+    );
+    Ok(set)
+}
+
 /// Of what networks learnt, presses like those they are judged by: a mean with the hardest ones, too,
 /// would be a worse one.
 pub(super) const TRAINING: [Source; 3] = [
@@ -211,6 +268,7 @@ impl Source {
             states.push(State {
                 origin: format!("{}, sample {index}", dataset.shard_path(indentation).display()),
                 indentation: indentation.id,
+                number: index,
                 depth_mm: *depth_mm,
                 pressure_pa: shown(Patch::Skin, &on_skin),
                 sed_j_per_m3: shown(Patch::Interface, &below),
@@ -229,6 +287,7 @@ mod tests {
         let state = |i: usize| State {
             origin: i.to_string(),
             indentation: i,
+            number: 0,
             depth_mm: 1.0,
             pressure_pa: Vec::new(),
             sed_j_per_m3: Vec::new(),

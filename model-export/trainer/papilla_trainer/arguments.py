@@ -230,6 +230,11 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "(networks on maps; again for each dataset)",
     )
     add(
+        "--contact-alone",
+        action="store_true",
+        help="learn from the pressure of --contact alone, and not from that of the simulations",
+    )
+    add(
         "--pseudo-labels",
         action="append",
         default=[],

@@ -42,6 +42,7 @@ class TrainConfig:
     dataset_samples: int | None = None
     shift_px: int = 0
     contact: list[str] = field(default_factory=list)
+    contact_alone: bool = False
     # Name and hash of the model whose weights are the first; none: random ones.
     start: dict[str, str] | None = None
     pseudo_labels: list[str] = field(default_factory=list)
@@ -52,6 +53,12 @@ class TrainConfig:
             raise UsageError("--shift-px is for networks on maps (map-...) alone")
         if self.contact and not isinstance(self.spec, MapSpec):
             raise UsageError("--contact is for networks on maps (map-...) alone")
+        if self.contact_alone and not self.contact:
+            raise UsageError("--contact-alone: give contact's pressure by --contact")
+        if self.contact_alone and self.pseudo_labels:
+            raise UsageError(
+                "--contact-alone: not with --pseudo-labels, which are of FE's pressure"
+            )
         if self.pseudo_labels and not isinstance(self.spec, MapSpec):
             raise UsageError("--pseudo-labels is for networks on maps (map-...) alone")
         if self.pseudo_samples is not None and (self.pseudo_samples < 1 or not self.pseudo_labels):

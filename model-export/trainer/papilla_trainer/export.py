@@ -139,6 +139,8 @@ def training_record(checkpoint: Checkpoint, weights: str) -> dict[str, Any]:
         training["shift_px"] = config.shift_px
     if config.contact:
         training["contact"] = [Path(file).name for file in config.contact]
+    if config.contact_alone:
+        training["contact_alone"] = True
     if config.pseudo_labels:
         training["pseudo_labels"] = [Path(file).name for file in config.pseudo_labels]
         training["pseudo_samples"] = config.pseudo_samples

@@ -95,6 +95,8 @@ def mean_record(runs: list[dict[str, Any]], finer: Correction | None = None) -> 
         record["finer"] = asdict(finer)
     if all("contact" in run for run in runs):
         record["contact"] = runs[0]["contact"]
+    if all(run.get("contact_alone") for run in runs):
+        record["contact_alone"] = True
     return record
 
 

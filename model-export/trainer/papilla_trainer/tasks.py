@@ -13,6 +13,7 @@ from papilla_trainer.comparison.unet import NetworkSpec, S1UNet, build_network
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.contact_maps import with_contact
 from papilla_trainer.dataset import Dataset, State
+from papilla_trainer.errors import UsageError
 from papilla_trainer.joined import STRIDE
 from papilla_trainer.losses import Loss, make_loss
 from papilla_trainer.map_network import MapNet, MapSpec
@@ -96,6 +97,10 @@ def make_task(
         units = (dataset.pressure_max_pa, dataset.sed_max_j_per_m3)
     states = dataset.states(fit_ids)
     simulated = with_contact(states, dataset, config.contact)
+    if config.contact_alone:
+        simulated, states = simulated[len(states) :], []
+        if not simulated:
+            raise UsageError("--contact-alone: no state of the training is in the --contact files")
     pseudo = pseudo_states(config.pseudo_labels, dataset)
     fit = Samples(simulated + pseudo, device, units)
     fit.source[len(states) : len(simulated)] += len(dataset.hashes)

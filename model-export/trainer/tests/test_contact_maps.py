@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from tiny_dataset import write_tiny_dataset
 
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.contact_maps import with_contact
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import DatasetError, UsageError
+from papilla_trainer.export import training_record
 from papilla_trainer.joined import STRIDE, JoinedDataset
 from papilla_trainer.training import Trainer
 
@@ -69,3 +72,29 @@ def test_a_run_learns_from_both_pressures(tiny: Dataset, tmp_path: Path) -> None
     states = sum(tiny.presses[i].samples for i in tiny.train_ids)
     assert len(trainer.fit_samples) == states + 1
     assert trainer.fit().history[-1]["train_loss"] > 0.0
+
+
+def test_a_run_learns_from_the_pressure_of_contact_alone(tiny: Dataset, tmp_path: Path) -> None:
+    first, held_out = tiny.train_ids[0], tiny.test_ids[0]
+    file = write(tmp_path / "c.npz", tiny, [first, held_out, first], [1, 0, 0])
+    config = TrainConfig(
+        network="map-c2-k3-r2",
+        epochs=1,
+        validation_presses=0,
+        contact=[file],
+        contact_alone=True,
+        device="cpu",
+    )
+    trainer = Trainer(tiny, config, tmp_path / "run")
+    inputs, _ = trainer.fit_samples.batch(torch.tensor([0, 1]))
+    assert len(trainer.fit_samples) == 2
+    assert inputs[:, 0, 0, 0].tolist() == [1.0, 3.0]
+    assert training_record(trainer.fit(), "best")["contact_alone"] is True
+    with pytest.raises(UsageError, match="--contact-alone"):
+        dataclasses.replace(config, contact=[])
+    with pytest.raises(UsageError, match="pseudo"):
+        dataclasses.replace(config, pseudo_labels=[file])
+    none_to_learn = write(tmp_path / "held-out.npz", tiny, [held_out], [0])
+    config = dataclasses.replace(config, contact=[none_to_learn])
+    with pytest.raises(UsageError, match="no state of the training"):
+        Trainer(tiny, config, tmp_path / "none")

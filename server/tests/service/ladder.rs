@@ -10,7 +10,7 @@ use tokio::time::timeout;
 
 use crate::{
     effects::windowed,
-    support::{Service, atlas, hello, model_folder, ramp, write},
+    support::{Service, atlas, contact, hello, model_folder, model_folder_on, ramp, write},
 };
 
 /// A rung as `model-export ladder` writes it.
@@ -149,33 +149,56 @@ async fn a_budget_is_kept_although_the_calibration_was_skipped() {
     panic!("{late} late frames, and none by another tier");
 }
 
-/// `quick` is the more accurate of FE's pressure, the only one that it learnt.
+/// `quick` learnt the pressure of simulations and `slow` that of contact. Each is more accurate, as
+/// it learnt more of what it is given, and no client has to know that.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_network_that_learnt_no_pressure_of_contact_is_taken_by_name_alone() {
+async fn sessions_get_the_network_that_learnt_what_they_give() {
     let mut ladder = ladder();
-    // As fast, it would outdo `slow` if it were for everybody.
+    ladder["atlas_hash"] = json!(contact::atlas().hash());
+    // From the pressure of simulations `quick` errs less, from poses `slow`, in the same time.
     ladder["rungs"][1] = rung("slow", Some("slow"), 4.0, 0.02);
+    for (place, error) in [0.04, 0.03].into_iter().enumerate() {
+        let of_simulations = ladder["rungs"][place]["errors"]["heldout-presses"].clone();
+        let errors = &mut ladder["rungs"][place]["errors"];
+        errors["poses"] = of_simulations;
+        errors["poses"]["relative_l2"]["median"] = json!(error);
+    }
     for ladder in [Some(ladder), None] {
-        let models = model_folder();
+        let models = model_folder_on(&contact::atlas());
+        write(models.path(), "finger.contact", &contact::model());
         let path = models.path().join("slow.json");
         let text = std::fs::read_to_string(&path).unwrap();
         let mut card: Value = serde_json::from_str(&text).unwrap();
-        card["training"]["contact"] = json!(["presses.npz"]);
+        card["training"] = json!({"contact": ["presses.npz"], "contact_alone": true});
         write(models.path(), "slow.json", card.to_string().as_bytes());
+        let index = json!({"default": "slow", "default_for_pressure": "quick",
+            "models": ["quick", "slow"]});
+        write(models.path(), "index.json", index.to_string().as_bytes());
         if let Some(ladder) = &ladder {
             write(models.path(), "ladder.json", ladder.to_string().as_bytes());
         }
         let service = Service::on(models, |config: &mut Config| config.calibration_ms = 0);
         let service = service.await.unwrap();
-        let tiers = service.json("/v1/tiers").await;
-        let why = [0, 1].map(|tier| tiers["tiers"][tier]["named_only"].clone());
-        assert_eq!(why, [json!("fe_pressure"), Value::Null], "{ladder:?}");
-        for (asked, answered) in
-            [(json!({"budget_us": 60_000_000}), "slow"), (json!({"tier": "quick"}), "quick")]
-        {
+        let listed = service.json("/v1/tiers").await;
+        assert_eq!(
+            (&listed["default"], &listed["default_for_pressure"]),
+            (&json!("slow"), &json!("quick"))
+        );
+        let learnt = [0, 1].map(|tier| listed["tiers"][tier]["learnt"].clone());
+        assert_eq!(learnt, [json!("fe"), json!("contact")]);
+        let from_poses = listed["tiers"][1]["relative_l2_median_from_poses"].as_f64();
+        assert_eq!(from_poses, ladder.as_ref().map(|_| 0.03));
+        for budget in [json!({}), json!({"budget_us": 60_000_000}), json!({"budget_us": 1})] {
             let mut socket = service.socket().await;
-            assert_eq!(socket.open(hello(&asked)).await["tier"], answered);
+            assert_eq!(socket.open(hello(&budget)).await["tier"], "quick", "{budget}, {ladder:?}");
+            let mut socket = service.socket().await;
+            let ready = socket.open(contact::ball_hello(&budget)).await;
+            assert_eq!(ready["tier"], "slow", "{budget}, {ladder:?}");
         }
+        // Whoever names a tier gets it.
+        let named = json!({"tier": "quick"});
+        let mut socket = service.socket().await;
+        assert_eq!(socket.open(contact::ball_hello(&named)).await["tier"], "quick");
     }
 }
 

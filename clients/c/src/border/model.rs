@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use papilla_proto::{MAP_LEN, atlas::Patch};
+use papilla_proto::{MAP_LEN, atlas::Patch, contact::Input};
 
 use super::{
     handle::{self, Failure, Handle, LastError},
@@ -84,7 +84,8 @@ pub(crate) unsafe extern "C" fn papilla_model_load(
             (folder, handle::text("tier", tier)?, handle::path("contact", contact)?)
         };
         let model = Model::load(folder.as_ref(), tier, contact)?;
-        handle.name = CString::new(model.card.name.clone()).unwrap_or_default();
+        let name = model.network_for(Input::Objects).card.name.clone();
+        handle.name = CString::new(name).unwrap_or_default();
         handle.atlas_hash = CString::new(model.bundle.atlas.hash()).unwrap_or_default();
         handle.model = Some(Arc::new(model));
         Ok(())
@@ -108,7 +109,7 @@ pub(crate) unsafe extern "C" fn papilla_model_info(
         let model = handle.loaded()?;
         let [skin, interface] =
             [Patch::Skin, Patch::Interface].map(|p| model.bundle.atlas.patch(p));
-        let network = model.network.info();
+        let network = model.network_for(Input::Objects).model.info();
         info.write(PapillaModelInfo {
             name: handle.name.as_ptr(),
             atlas_hash: handle.atlas_hash.as_ptr(),

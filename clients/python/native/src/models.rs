@@ -11,8 +11,8 @@ use std::{
     time::Duration,
 };
 
-use papilla_inside::{Frame, Model, Problem, Session as Inside, read_hello};
-use papilla_proto::MAP_LEN;
+use papilla_inside::{Frame, Model, Network, Problem, Session as Inside, read_hello};
+use papilla_proto::{MAP_LEN, contact::Input};
 use pyo3::{buffer::PyBuffer, prelude::*};
 
 use crate::{
@@ -47,10 +47,16 @@ impl Models {
         Ok(Self { model: Arc::new(model), idle: Mutex::default() })
     }
 
-    /// Name of the network.
+    /// Name of the network for maps of pressure.
     #[getter]
     fn name(&self) -> &str {
-        &self.model.card.name
+        &self.for_pressure().card.name
+    }
+
+    /// Names of the networks that were loaded, each once: for poses and gaps, and for pressure.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.model.networks().map(|of| of.card.name.clone()).collect()
     }
 
     /// Hash of the atlas.
@@ -59,10 +65,10 @@ impl Models {
         self.model.bundle.atlas.hash()
     }
 
-    /// Greatest pressure that the network was trained on, Pa.
+    /// Greatest pressure that the network for maps of pressure was trained on, Pa.
     #[getter]
     fn pressure_max_pa(&self) -> f32 {
-        self.model.network.info().pressure_max_pa
+        self.for_pressure().model.info().pressure_max_pa
     }
 
     /// Whether pressure can be found from poses and gaps.
@@ -71,12 +77,10 @@ impl Models {
         self.model.bundle.contact.is_some()
     }
 
-    /// The network's card, as JSON.
+    /// The card of the network for maps of pressure, as JSON.
     fn card(&self, py: Python<'_>) -> PyResult<String> {
-        self.model
-            .card
-            .to_json()
-            .map_err(|problem| error(py, "NativeFault", (problem.to_string(),)))
+        let text = self.for_pressure().card.to_json();
+        text.map_err(|problem| error(py, "NativeFault", (problem.to_string(),)))
     }
 
     /// A session on the terms of a hello, as JSON.
@@ -120,6 +124,12 @@ impl Models {
                 Err(error(py, "BadInput", ("pressure_pa", problem.message, Some(map))))
             }
         }
+    }
+}
+
+impl Models {
+    fn for_pressure(&self) -> &Network {
+        self.model.network_for(Input::Pressure)
     }
 }
 

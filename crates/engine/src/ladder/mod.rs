@@ -12,9 +12,21 @@ use std::collections::BTreeMap;
 /// Name of the set of states on the finest mesh.
 pub const REFERENCE_SET: &str = "reference";
 
-/// Names of the held-out sets. Tiers are compared on the first of them on which all were measured.
-pub const SET_NAMES: [&str; 6] =
-    ["heldout-presses", "heldout-shapes", REFERENCE_SET, "reference-anew", "pressed", "s1"];
+/// Name of the set whose pressure the service's contact found from poses. The other sets have the
+/// pressure of the simulations.
+pub const POSES_SET: &str = "poses";
+
+/// Names of the held-out sets. For clients that give pressure, tiers are compared on the first of
+/// them on which all were measured; for clients that give poses or gaps, on [`POSES_SET`].
+pub const SET_NAMES: [&str; 7] = [
+    "heldout-presses",
+    "heldout-shapes",
+    REFERENCE_SET,
+    "reference-anew",
+    "pressed",
+    "s1",
+    POSES_SET,
+];
 
 /// All rungs, measured on the same sets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@ use papilla_engine::{
     Backend, Card, Choice, Ladder, Model,
     card::Index,
     error_law::ErrorLaws,
-    ladder::{Kind, SET_NAMES},
+    ladder::{Kind, POSES_SET, SET_NAMES},
     load_with,
 };
 use papilla_proto::{
@@ -15,7 +15,7 @@ use papilla_proto::{
 };
 use serde_json::Value;
 
-use super::{Held, NamedOnly, Tier, TrainedOn, golden};
+use super::{Given, Held, NamedOnly, Tier, TrainedOn, golden};
 use crate::{
     config::Config,
     core::{digest::sha256_hex, latency::Latency},
@@ -71,14 +71,11 @@ fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
 }
 
 /// Gives the tiers their times and errors from the ladder, and marks those that no budget may pick.
-/// Returns the name of the test set that all tiers are compared on; None: there is no ladder, or no
-/// set has an error of every tier.
+/// Returns the name of the test set that all tiers are compared on for clients that give pressure;
+/// None: there is no ladder, or no set has an error of every tier.
 pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<String> {
-    let is_choice = tiers.iter().any(|tier| tier.knows_contact);
     for tier in tiers.iter_mut() {
-        let is_narrow = is_choice && tier.kind == Kind::Network && !tier.knows_contact;
-        let by_need = tier.on_demand.then_some(NamedOnly::OnDemand);
-        tier.named_only = is_narrow.then_some(NamedOnly::FePressure).or(by_need);
+        tier.named_only = tier.on_demand.then_some(NamedOnly::OnDemand);
     }
     let ladder = ladder?;
     for tier in tiers.iter() {
@@ -89,25 +86,37 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
         }
     }
     let error = |tier: &Tier, set: &str| ladder.rung_of(&tier.name)?.relative_l2(set);
-    let complete = |set: &&str| tiers.iter().all(|tier| error(tier, set).is_some());
-    let set = SET_NAMES.into_iter().find(complete)?;
+    let is_complete = |set: &str| tiers.iter().all(|tier| error(tier, set).is_some());
+    let from_poses = is_complete(POSES_SET);
+    let set = SET_NAMES.into_iter().find(|set| *set != POSES_SET && is_complete(set))?;
     for tier in tiers.iter_mut() {
         tier.relative_l2_median = error(tier, set).unwrap_or(tier.relative_l2_median);
+        tier.relative_l2_median_from_poses = error(tier, POSES_SET).filter(|_| from_poses);
     }
-    let ms = |tier: &Tier| shipped_ms(ladder, tier);
-    let beats = |better: &Tier, tier: &Tier| {
-        ms(better).zip(ms(tier)).is_some_and(|(a, b)| a <= MARGIN * b)
-            && better.relative_l2_median < tier.relative_l2_median
-            && better.renders(&tier.effects)
-    };
-    let wide = || tiers.iter().filter(|tier| tier.named_only.is_none());
-    let outdone: Vec<_> = tiers.iter().map(|tier| wide().any(|t| beats(t, tier))).collect();
+    let outdone: Vec<bool> = tiers.iter().map(|tier| is_outdone(tier, tiers, ladder)).collect();
     for (tier, outdone) in tiers.iter_mut().zip(outdone) {
-        if outdone && tier.named_only != Some(NamedOnly::FePressure) {
+        if outdone {
             tier.named_only = Some(NamedOnly::Outdone);
         }
     }
     Some(set.to_owned())
+}
+
+/// Whether, for each kind of pressure that this tier suits, another that a budget may pick is more
+/// accurate and no slower.
+fn is_outdone(tier: &Tier, tiers: &[Tier], ladder: &Ladder) -> bool {
+    let ms = |tier: &Tier| shipped_ms(ladder, tier);
+    let beats = |better: &Tier, given: Given| {
+        ms(better).zip(ms(tier)).is_some_and(|(a, b)| a <= MARGIN * b)
+            && better.error(given) < tier.error(given)
+            && better.renders(&tier.effects)
+    };
+    let by_another = |given: Given| {
+        let others = tiers.iter().filter(|other| other.named_only.is_none() && other.suits(given));
+        others.into_iter().any(|other| beats(other, given))
+    };
+    let mut suited = [Given::Pressure, Given::Contact].into_iter().filter(|of| tier.suits(*of));
+    suited.all(by_another)
 }
 
 /// A tier whose shipped time is at most this many times another's does not count as slower.
@@ -253,8 +262,8 @@ impl<'a> Loading<'a> {
         Self { default, backend, calibration, what: What::OfStart, similar: None }
     }
 
-    /// As [`of`](Self::of), but for the default tier's model alone, so that it answers before the
-    /// others are loaded.
+    /// As [`of`](Self::of), but for the models of the default tiers alone, so that they answer before
+    /// the others are loaded.
     pub(crate) fn of_default(config: &'a Config) -> Self {
         Self { what: What::Default, ..Self::of(config) }
     }
@@ -279,7 +288,10 @@ impl<'a> Loading<'a> {
     /// Whether a model is loaded now.
     pub(super) fn is_now(self, name: &str, index: &Index) -> bool {
         match self.what {
-            What::Default => self.default.unwrap_or(&index.default) == name,
+            What::Default => match self.default {
+                Some(default) => default == name,
+                None => index.defaults().any(|(_, default)| default == name),
+            },
             What::OfStart => !self.is_on_demand(name, index),
             What::All => true,
         }
@@ -383,8 +395,9 @@ impl TierFiles<'_> {
             response_max_per_mpa: card.response_max_per_mpa,
             sed_max_j_per_m3: card.sed_max_j_per_m3,
             relative_l2_median: card.metrics.relative_l2.median,
+            relative_l2_median_from_poses: None,
             relative_l2_p95: card.metrics.relative_l2.p95,
-            knows_contact: card.knows_contact(),
+            learnt: card.learnt(),
             finger_sha256: card.finger_sha256().map(str::to_owned),
             effects: card.effects,
             atlas_hash: card.atlas_hash,

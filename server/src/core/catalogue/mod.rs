@@ -33,7 +33,7 @@ use self::{
 pub(crate) use self::{
     held::{Held, RETRY_AFTER},
     load::{Loading, ReadCard, Similar},
-    tier::{NamedOnly, Tier, TrainedOn},
+    tier::{Given, NamedOnly, Tier, TrainedOn},
 };
 use crate::{
     StartError,
@@ -75,8 +75,10 @@ pub(crate) struct Catalogue {
     pub(crate) place: usize,
     /// In the index's order.
     pub(crate) tiers: Vec<Tier>,
-    /// Index of the tier for clients that name neither a tier nor a budget.
+    /// Index of the tier for clients that give poses or gaps and name neither a tier nor a budget.
     pub(crate) default: usize,
+    /// The same for clients that give pressure.
+    pub(crate) default_for_pressure: usize,
     pub(crate) atlas: Atlas,
     pub(crate) atlas_json: Bytes,
     pub(crate) skin: Arc<Raster>,
@@ -89,8 +91,8 @@ pub(crate) struct Catalogue {
     /// The laws by which the error of an answer is estimated. None: the folder has no `errors.json`
     /// of this atlas.
     pub(crate) error_laws: Option<ErrorLaws>,
-    /// The test set by whose errors tiers are compared. None: each is judged by the error on its
-    /// card.
+    /// The test set by whose errors tiers are compared for clients that give pressure. None: each
+    /// is judged by the error on its card.
     pub(crate) judged_on: Option<String>,
     pub(crate) overhead: Overhead,
     /// What all sessions with effects share.
@@ -114,6 +116,7 @@ impl Catalogue {
             place: 0,
             tiers,
             default: 0,
+            default_for_pressure: 0,
             atlas_json: Bytes::new(),
             skin_pixels: SkinPixels::from(&skin),
             skin: Arc::new(skin),
@@ -206,10 +209,15 @@ impl Catalogue {
             }
             tiers.push(tier);
         }
-        let wanted = loading.default.unwrap_or(&index.default);
-        let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {
-            StartError::UnknownDefault { name: wanted.to_owned(), known: index.models.join(", ") }
-        })?;
+        let place_of = |name: &str| {
+            tiers.iter().position(|t| t.name == name).ok_or_else(|| StartError::UnknownDefault {
+                name: name.to_owned(),
+                known: index.models.join(", "),
+            })
+        };
+        let default = place_of(loading.default.unwrap_or(&index.default))?;
+        let for_pressure = loading.default.unwrap_or_else(|| index.default_for_pressure());
+        let default_for_pressure = place_of(for_pressure)?;
         let ladder = match assets.get("ladder.json") {
             Some(json) => {
                 Some(load_ladder(json, &atlas, &tiers).map_err(|e| bad("ladder.json", &e))?)
@@ -228,6 +236,7 @@ impl Catalogue {
             place: 0,
             tiers,
             default,
+            default_for_pressure,
             atlas,
             atlas_json,
             skin_pixels: SkinPixels::from(&skin),
@@ -324,7 +333,7 @@ impl Catalogue {
             atlas_hash: &tier.atlas_hash,
             onnx_sha256: &tier.onnx_sha256,
             backend: tier.backend_label().unwrap_or("none"),
-            is_default: place == self.default,
+            is_default: place == self.default || place == self.default_for_pressure,
             is_offered: !tier.retired,
         })
     }
@@ -334,19 +343,33 @@ impl Catalogue {
         self.offered().map(|(_, t)| t.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
+    /// The default tier for clients of this kind.
+    pub(crate) fn default_for(&self, given: Given) -> usize {
+        match given {
+            Given::Pressure => self.default_for_pressure,
+            Given::Contact => self.default,
+        }
+    }
+
     /// The tier for a client that named none, among tiers that render `effects`. None: no tier that
     /// renders them is loaded.
     ///
     /// Without a budget it is the default tier, or else the first that is loaded. With a budget it
     /// is the most accurate tier that is expected to meet it, or else the fastest. Tiers that are
     /// loaded on demand are never chosen.
-    pub(crate) fn choose(&self, budget_us: Option<u32>, effects: &[String]) -> Option<usize> {
+    pub(crate) fn choose(
+        &self,
+        budget_us: Option<u32>,
+        effects: &[String],
+        given: Given,
+    ) -> Option<usize> {
         let Some(budget_us) = budget_us else {
             let mut fitting = self.ready_for(effects).map(|(place, _)| place);
-            let default = Some(self.default).filter(|&tier| self.tiers[tier].renders(effects));
+            let default = Some(self.default_for(given));
+            let default = default.filter(|&tier| self.tiers[tier].renders(effects));
             return default.or_else(|| fitting.next());
         };
-        self.choose_among(budget_us, effects, |_| true)
+        self.choose_among(budget_us, effects, given, |_| true)
     }
 
     /// The tier for a budget among those that `may` accepts: the most accurate one that is expected
@@ -355,10 +378,11 @@ impl Catalogue {
         &self,
         budget_us: u32,
         effects: &[String],
+        given: Given,
         may: impl Fn(usize) -> bool,
     ) -> Option<usize> {
-        let fitting = || self.for_budgets(effects).filter(|&place| may(place));
-        let error = |place: usize| self.tiers[place].relative_l2_median;
+        let fitting = || self.for_budgets(effects, given).filter(|&place| may(place));
+        let error = |place: usize| self.tiers[place].error(given);
         fitting()
             .filter(|&place| self.meets(place, Some(budget_us)) == Some(true))
             .min_by(|&a, &b| error(a).total_cmp(&error(b)))
@@ -379,12 +403,16 @@ impl Catalogue {
     }
 
     /// Places of the tiers that a budget may pick: they are loaded, render these effects, and are
-    /// not loaded on demand. Tiers marked as [`NamedOnly`] are left out if there are any others.
-    pub(crate) fn for_budgets(&self, effects: &[String]) -> impl Iterator<Item = usize> {
+    /// not loaded on demand. Tiers that learnt other pressure, and those marked as [`NamedOnly`],
+    /// are left out if there are any others.
+    pub(crate) fn for_budgets(
+        &self,
+        effects: &[String],
+        given: Given,
+    ) -> impl Iterator<Item = usize> {
+        let is_choice = move |tier: &Tier| tier.named_only.is_none() && tier.suits(given);
         let fitting = move || self.ready_for(effects);
-        let is_choice = fitting().any(|(_, tier)| tier.named_only.is_none());
-        fitting()
-            .filter(move |(_, tier)| !(is_choice && tier.named_only.is_some()))
-            .map(|(place, _)| place)
+        let has_choice = fitting().any(|(_, tier)| is_choice(tier));
+        fitting().filter(move |(_, tier)| !has_choice || is_choice(tier)).map(|(place, _)| place)
     }
 }

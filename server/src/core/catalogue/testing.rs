@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, atomic::AtomicUsize};
 
-use papilla_engine::{Backend, EngineError, Model, ModelInfo, Session, ladder::Kind};
+use papilla_engine::{Backend, EngineError, Model, ModelInfo, Session, card::Learnt, ladder::Kind};
 use papilla_proto::atlas::{Atlas, PatchVertices};
 use serde_json::json;
 
@@ -74,8 +74,9 @@ pub(crate) fn tier(model: Arc<dyn Model>, relative_l2_median: f64) -> Tier {
         sed_max_j_per_m3: 100.0,
         kind: Kind::Network,
         relative_l2_median,
+        relative_l2_median_from_poses: None,
         relative_l2_p95: 0.0,
-        knows_contact: false,
+        learnt: Learnt::Both,
         trained_on: None,
         named_only: None,
         latency: Arc::new(Latency::default()),

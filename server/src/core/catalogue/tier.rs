@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, atomic::AtomicUsize};
 
-use papilla_engine::{Backend, Model, Session, ladder::Kind};
-use papilla_proto::InputStatistics;
+use papilla_engine::{Backend, Model, Session, card::Learnt, ladder::Kind};
+use papilla_proto::{InputStatistics, contact::Input};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -45,12 +45,15 @@ pub(crate) struct Tier {
     pub(crate) sed_max_j_per_m3: f32,
     /// What kind of rung it is on the ladder.
     pub(crate) kind: Kind,
-    /// Median relative L2 error on `Catalogue::judged_on`.
+    /// Median relative L2 error from the client's pressure, on `Catalogue::judged_on`.
     pub(crate) relative_l2_median: f64,
+    /// Median relative L2 error from the pressure that contact finds for poses. None: the ladder
+    /// does not have it for every tier.
+    pub(crate) relative_l2_median_from_poses: Option<f64>,
     /// 95th percentile of the relative L2 error on the test set of its card.
     pub(crate) relative_l2_p95: f64,
-    /// Whether its training included pressure from the contact methods, beside FE pressure.
-    pub(crate) knows_contact: bool,
+    /// Which pressure it learnt from.
+    pub(crate) learnt: Learnt,
     /// The finger whose simulations trained it. None: that of this catalogue. Some: it serves by
     /// similarity alone, and its answers have the flag for that.
     pub(crate) trained_on: Option<TrainedOn>,
@@ -78,14 +81,46 @@ pub(crate) struct TrainedOn {
 pub(crate) enum NamedOnly {
     /// Another tier is more accurate and no slower.
     Outdone,
-    /// It was trained on FE pressure alone. From pressure of the contact methods, which most
-    /// sessions use, its SED is worse.
-    FePressure,
     /// It is loaded when a client names it, and a budget must not wait for that.
     OnDemand,
 }
 
+/// Where the pressure comes from that a session renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Given {
+    /// The client gives it.
+    Pressure,
+    /// The client gives poses or gaps, and contact finds it.
+    Contact,
+}
+
+impl From<Input> for Given {
+    fn from(input: Input) -> Self {
+        match input {
+            Input::Pressure => Self::Pressure,
+            Input::Gaps | Input::Objects => Self::Contact,
+        }
+    }
+}
+
 impl Tier {
+    /// Whether it learnt such pressure. What is no network learnt none and takes any.
+    pub(crate) fn suits(&self, given: Given) -> bool {
+        self.kind != Kind::Network
+            || match given {
+                Given::Pressure => self.learnt.knows_fe(),
+                Given::Contact => self.learnt.knows_contact(),
+            }
+    }
+
+    /// Its median relative L2 error from such pressure.
+    pub(crate) fn error(&self, given: Given) -> f64 {
+        match given {
+            Given::Pressure => self.relative_l2_median,
+            Given::Contact => self.relative_l2_median_from_poses.unwrap_or(self.relative_l2_median),
+        }
+    }
+
     /// Whether it renders these effects.
     pub(crate) fn renders(&self, effects: &[String]) -> bool {
         effects.iter().all(|effect| self.effects.contains(effect))

@@ -289,7 +289,8 @@ fn keeps_promises(tier: &Tier, old: &Catalogue) -> Result<(), ReloadError> {
 /// Orders the tiers of `new` so that each keeps the place it has in `old`; tiers with new names
 /// come last. Tiers that only `old` has stay in their places and are retired.
 fn succeed(mut new: Catalogue, old: &Catalogue) -> (Catalogue, Changes) {
-    let default = new.tiers[new.default].name.clone();
+    let [default, for_pressure] =
+        [new.default, new.default_for_pressure].map(|place| new.tiers[place].name.clone());
     let mut coming = std::mem::take(&mut new.tiers);
     let mut changes = Changes { default: default.clone(), ..Changes::default() };
     for before in &old.tiers {
@@ -312,5 +313,6 @@ fn succeed(mut new: Catalogue, old: &Catalogue) -> (Catalogue, Changes) {
     changes.added.extend(coming.iter().map(|tier| tier.name.clone()));
     new.tiers.append(&mut coming);
     new.default = new.find(&default).unwrap_or_default();
+    new.default_for_pressure = new.find(&for_pressure).unwrap_or_default();
     (new, changes)
 }

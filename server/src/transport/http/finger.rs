@@ -47,7 +47,7 @@ pub(crate) async fn list(State(app): Shared) -> Answer {
 }
 
 fn loaded(Loaded { catalogue, contact }: &Loaded, memory: Option<Memory>) -> Value {
-    let Catalogue { name, atlas, tiers, default, .. } = &**catalogue;
+    let Catalogue { name, atlas, tiers, default, default_for_pressure, .. } = &**catalogue;
     let of_tiers = catalogue.offered().map(|(_, tier)| {
         json!({
             "name": tier.name,
@@ -63,6 +63,7 @@ fn loaded(Loaded { catalogue, contact }: &Loaded, memory: Option<Memory>) -> Val
         "vertices": atlas.vertex_count(),
         "contact": contact.is_some(),
         "default_tier": tiers[*default].name,
+        "default_tier_for_pressure": tiers[*default_for_pressure].name,
         "tiers": of_tiers.collect::<Vec<Value>>(),
         "files_bytes": memory.map(|memory| memory.files_bytes),
         "grown_bytes": memory.and_then(|memory| memory.grown_bytes),

@@ -89,8 +89,9 @@ pub(crate) async fn tiers(
     let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     // The ladder is long and never changes: its JSON is put in as it is.
     let text = format!(
-        r#"{{"default":{},"judged_on":{},"ladder":{},"methods":{},"overhead_us":{},"tiers":{}}}"#,
+        r#"{{"default":{},"default_for_pressure":{},"judged_on":{},"ladder":{},"methods":{},"overhead_us":{},"tiers":{}}}"#,
         json!(catalogue.tiers[catalogue.default].name),
+        json!(catalogue.tiers[catalogue.default_for_pressure].name),
         json!(catalogue.judged_on),
         catalogue.ladder_json,
         json!(contact.as_deref().map(methods)),
@@ -118,12 +119,15 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
         "on_demand": tier.on_demand,
         "loaded": tier.is_loaded(),
         "default": index == catalogue.default,
+        "default_for_pressure": index == catalogue.default_for_pressure,
+        "learnt": tier.learnt,
         "effects": tier.effects,
         "atlas_hash": tier.atlas_hash,
         "pressure_max_pa": tier.pressure_max_pa,
         "pattern_max": tier.input_statistics_max,
         "sed_max_j_per_m3": tier.sed_max_j_per_m3,
         "relative_l2_median": tier.relative_l2_median,
+        "relative_l2_median_from_poses": tier.relative_l2_median_from_poses,
         "trained_on": tier.trained_on.as_ref().map(|lender| &lender.name),
         "named_only": tier.named_only,
         "predicted_latency_us": catalogue.predicted_latency_us(index),

@@ -16,7 +16,10 @@ use papilla_metrics::Transport;
 use papilla_proto::{Problem, contact::DEFAULT_FINGER};
 
 use crate::{
-    core::scheduler::{Job, JobOptions},
+    core::{
+        catalogue::Given,
+        scheduler::{Job, JobOptions},
+    },
     transport::{
         answer::{
             Answer, Shared, answer, body, refuse,
@@ -60,7 +63,10 @@ async fn render(
     let catalogue = finger::called(app, principal, name).await?.catalogue;
     let place = match &query.tier {
         Some(name) => catalogue.tier_named(name)?,
-        None => catalogue.choose(query.budget(), &[]).unwrap_or(catalogue.default),
+        None => {
+            let chosen = catalogue.choose(query.budget(), &[], Given::Pressure);
+            chosen.unwrap_or(catalogue.default_for_pressure)
+        }
     };
     let tier = catalogue.tier_number(place);
     first_use::wait(app, tier, principal.client.as_ref(), app.timeouts.io).await?;

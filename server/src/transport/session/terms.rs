@@ -27,7 +27,7 @@ use super::{
 use crate::{
     core::{
         buffers::HEADROOM,
-        catalogue::{Catalogue, Tier, places},
+        catalogue::{Catalogue, Given, Tier, places},
         desk::Cancel,
         fingers::Loaded,
     },
@@ -264,6 +264,7 @@ fn agree(
     let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
     let budget_us = hello.budget_us.filter(|&us| us > 0);
     let by_budget = budget_us.filter(|_| hello.tier.is_none());
+    let given = Given::from(hello.input.unwrap_or_default());
     let loaded = loaded(app, hello)?;
     let mut parts: Vec<Part> = Vec::new();
     let mut part_of = Vec::with_capacity(loaded.len());
@@ -281,7 +282,7 @@ fn agree(
         parts.push(Part {
             finger: catalogue.place,
             tier: catalogue.tier_number(place),
-            budget: by_budget.map(|us| Budget::new(us, wanted.clone())),
+            budget: by_budget.map(|us| Budget::new(us, wanted.clone(), given)),
             contact_us: None,
             atlas_hash: catalogue.atlas.hash().to_owned(),
             first: number,
@@ -340,6 +341,7 @@ fn choose(
     wanted: &[String],
     before: Option<&str>,
 ) -> Result<usize, Problem> {
+    let given = Given::from(hello.input.unwrap_or_default());
     let place = match &hello.tier {
         Some(name) => catalogue.tier_named(name)?,
         None => before
@@ -350,8 +352,8 @@ fn choose(
                     && tier.is_loaded()
                     && wanted.iter().all(|effect| tier.effects.contains(effect))
             })
-            .or_else(|| catalogue.choose(hello.budget_us.filter(|&us| us > 0), wanted))
-            .unwrap_or(catalogue.default),
+            .or_else(|| catalogue.choose(hello.budget_us.filter(|&us| us > 0), wanted, given))
+            .unwrap_or_else(|| catalogue.default_for(given)),
     };
     let tier = &catalogue.tiers[place];
     if !tier.is_loaded() {

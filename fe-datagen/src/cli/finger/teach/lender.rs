@@ -40,6 +40,10 @@ pub(super) struct Training {
     pub seconds: f64,
     epochs: f64,
     presses: Presses,
+    /// Files of contact's pressure that it learnt from.
+    contact: Vec<String>,
+    /// Whether it learnt from those alone.
+    contact_alone: bool,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -73,11 +77,35 @@ impl Lender {
         Ok(Self { name: name.to_owned(), onnx, card })
     }
 
+    /// Whether it learnt from the pressure of contact, and so will the network that it becomes.
+    pub(super) fn knows_contact(&self) -> bool {
+        !self.card.training.contact.is_empty()
+    }
+
+    /// Whether it learnt from that alone, and not from the pressure of presses.
+    pub(super) fn knows_contact_alone(&self) -> bool {
+        self.card.training.contact_alone
+    }
+
     /// Core seconds of an epoch over one press, where it was trained.
     pub(super) fn seconds_per_press_and_epoch(&self) -> f64 {
-        let Training { seconds, epochs, presses } = &self.card.training;
+        let Training { seconds, epochs, presses, .. } = &self.card.training;
         seconds / (epochs * presses.fit).max(1.0)
     }
+}
+
+/// What is read of an index.
+#[derive(Debug, Deserialize)]
+struct Index {
+    default: String,
+    default_for_pressure: Option<String>,
+}
+
+/// Names of a folder's defaults: the network for poses and gaps, and the one for pressure.
+pub(super) fn usual(folder: &Path) -> anyhow::Result<Vec<String>> {
+    let Index { default, default_for_pressure } = atomic::read_json(&folder.join("index.json"))?;
+    let other = default_for_pressure.filter(|name| *name != default);
+    Ok(std::iter::once(default).chain(other).collect())
 }
 
 /// Refuses networks of another finger in a bundle, but for those that are going to be replaced.

@@ -52,7 +52,8 @@ pub(super) struct Args {
     /// more than before.
     #[arg(long)]
     presses: Option<usize>,
-    /// Network to train on; may be given several times [default: small].
+    /// Network to train on; may be given several times [default: those that the folder's index names
+    /// as defaults, for poses and for pressure].
     #[arg(long = "network", value_name = "NAME")]
     networks: Vec<String>,
     /// Folder with these networks and their cards.
@@ -115,8 +116,10 @@ fn teach(args: &Args, stop: std::sync::Arc<std::sync::atomic::AtomicBool>) -> an
     let finger = Finger::read(folder)?;
     check_elements(&finger.shape)?;
     let scale = sequence::Scale::of(&finger.shape)?;
-    let usual = ["small".to_owned()];
-    let names = if args.networks.is_empty() { &usual[..] } else { &args.networks };
+    let names = match args.networks.is_empty() {
+        true => lender::usual(&args.from)?,
+        false => args.networks.clone(),
+    };
     let lenders = names
         .iter()
         .map(|name| Lender::read(&args.from, name))

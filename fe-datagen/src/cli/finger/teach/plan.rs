@@ -129,6 +129,9 @@ pub(super) fn plan(
         };
         lenders.iter().map(|lender| (lender.name.clone(), hours(lender))).collect()
     };
+    // A network that learns both sees each state twice: with its own pressure, and with contact's.
+    let learns_both = |of: &Lender| of.knows_contact() && !of.knows_contact_alone();
+    let pressures = 1 + usize::from(!args.without_contact && lenders.iter().any(learns_both));
     let probe = of(LOOKED_AT)?;
     let mut forecast = None;
     let presses = match (args.presses, args.hours, planned) {
@@ -140,7 +143,7 @@ pub(super) fn plan(
             let found = Forecast::of(&probe, args, programs)?;
             let (_, longest) = of(MOST)?;
             let needed = |presses: usize| {
-                let epochs = epochs_of(args, &longest, presses);
+                let epochs = epochs_of(args, &longest, presses, pressures);
                 let training: f64 = training(presses, epochs).iter().map(|(_, h)| h).sum();
                 found.hours(&longest, presses) + contact_hours + training
             };
@@ -165,7 +168,7 @@ pub(super) fn plan(
     let press_hours = forecast.as_ref().map(|forecast| forecast.hours(&spec, presses));
     let left = presses - solved.min(presses);
     let held_out = held_out(&spec).test.len();
-    let epochs = epochs_of(args, &spec, presses);
+    let epochs = epochs_of(args, &spec, presses, pressures);
     Ok(Plan {
         presses,
         states: spec.samples(),
@@ -182,14 +185,13 @@ pub(super) fn plan(
     })
 }
 
-/// Passes over the presses in training: as many steps, however few presses.
-fn epochs_of(args: &Args, spec: &CampaignSpec, presses: usize) -> usize {
+/// Passes over the presses in training: as many steps, however few presses. Of each state so many
+/// `pressures` are learnt.
+fn epochs_of(args: &Args, spec: &CampaignSpec, presses: usize, pressures: usize) -> usize {
     let own = CampaignSpec { presses, ..spec.clone() };
     let states_per_press = own.samples() as f64 / presses as f64;
     let learnt = presses - held_out(&own).test.len();
-    // The same states once more, with the pressure of contact.
-    let pressures = if args.without_contact { 1.0 } else { 2.0 };
-    let samples = (learnt as f64 * states_per_press * pressures).max(1.0);
+    let samples = (learnt as f64 * states_per_press * pressures as f64).max(1.0);
     let epochs = ((STEPS * BATCH) as f64 / samples).ceil() as usize;
     args.epochs.unwrap_or(epochs.clamp(*EPOCHS.start(), *EPOCHS.end()))
 }

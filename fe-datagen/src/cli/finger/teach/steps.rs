@@ -110,11 +110,23 @@ pub(super) fn run(
             of_own_finger: lender.card.metrics.relative_l2,
         });
     }
-    let default = lenders.iter().find(|l| l.name == "small").or(lenders.first());
-    let default = default.map_or("small", |lender| &lender.name);
-    programs.run(programs.model_export(words([&"index", folder, &"--default", &default])))?;
+    programs.run(index(programs, folder, lenders))?;
     programs.run(programs.model_export(words([&"patterns", folder, &"--dataset", &presses])))?;
     Ok(report)
+}
+
+/// Lists the networks. The default is the first that learnt contact's pressure, for which most clients
+/// ask; the one for clients who give pressure is the first that learnt that of presses.
+fn index(programs: &Programs, folder: &Path, lenders: &[Lender]) -> std::process::Command {
+    let first = |is: fn(&Lender) -> bool| lenders.iter().find(|of| is(of)).or(lenders.first());
+    let [default, for_pressure] =
+        [first(Lender::knows_contact), first(|of| !of.knows_contact_alone())]
+            .map(|of| of.map_or("small", |lender| &lender.name));
+    let mut index = programs.model_export(words([&"index", &folder, &"--default", &default]));
+    if for_pressure != default {
+        index.args(["--default-for-pressure", for_pressure]);
+    }
+    index
 }
 
 /// Puts the presses' atlas into a bundle that has none.
@@ -195,8 +207,9 @@ fn train(
         &SHIFT_PX,
     ]));
     train.args(threads);
-    if let Some(contact) = contact {
+    if let Some(contact) = contact.filter(|_| lender.knows_contact()) {
         train.arg("--contact").arg(contact);
+        train.args(lender.knows_contact_alone().then_some("--contact-alone"));
     }
     programs.run(train)?;
     programs.run(programs.trainer(words([&"export", &run, &"--name", name, &"--onnx", &onnx])))?;

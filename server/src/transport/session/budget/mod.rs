@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::core::catalogue::Catalogue;
+use crate::core::catalogue::{Catalogue, Given};
 
 /// Late frames after which a session changes to a faster tier. Two more may be on their way then.
 const LATE_MOST: u32 = 8;
@@ -58,6 +58,8 @@ pub(super) struct Budget {
     budget_us: u32,
     /// Effects that the tier has to render.
     effects: Vec<String>,
+    /// Where the session's pressure comes from.
+    given: Given,
     changed: Option<Instant>,
     try_after: Duration,
     /// Whether the last change was to a more accurate tier.
@@ -65,8 +67,8 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    pub(super) fn new(budget_us: u32, effects: Vec<String>) -> Self {
-        Self { budget_us, effects, changed: None, try_after: TRY_AFTER, has_climbed: false }
+    pub(super) fn new(budget_us: u32, effects: Vec<String>, given: Given) -> Self {
+        Self { budget_us, effects, given, changed: None, try_after: TRY_AFTER, has_climbed: false }
     }
 
     /// The place of the tier to change to for the next frame; None: stay with `tier`. Allocates
@@ -95,7 +97,8 @@ impl Budget {
         } else {
             None
         }?;
-        let climbs = error_of(catalogue, next) < error_of(catalogue, tier);
+        let error = |tier: usize| catalogue.tiers[tier].error(self.given);
+        let climbs = error(next) < error(tier);
         self.try_after = match (self.has_climbed, climbs) {
             (true, false) => (2 * self.try_after).min(TRY_AFTER_MOST),
             // The tier that was tried before has kept the budget.
@@ -112,23 +115,20 @@ impl Budget {
     fn faster(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
         let time_us = catalogue.predicted_latency_us(tier);
         let is_faster = |place: usize| catalogue.predicted_latency_us(place) < time_us;
-        catalogue.choose_among(self.budget_us, &self.effects, is_faster)
+        catalogue.choose_among(self.budget_us, &self.effects, self.given, is_faster)
     }
 
     /// Among the tiers that are more accurate than this one and may keep the budget, the most
     /// accurate.
     fn more_accurate(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
         let most_us = SHARE_TO_CLIMB * f64::from(self.budget_us);
+        let error = |tier: usize| catalogue.tiers[tier].error(self.given);
         catalogue
-            .for_budgets(&self.effects)
-            .filter(|&place| error_of(catalogue, place) < error_of(catalogue, tier))
+            .for_budgets(&self.effects, self.given)
+            .filter(|&place| error(place) < error(tier))
             .filter(|&place| catalogue.hoped_latency_us(place, tier) as f64 <= most_us)
-            .min_by(|&a, &b| error_of(catalogue, a).total_cmp(&error_of(catalogue, b)))
+            .min_by(|&a, &b| error(a).total_cmp(&error(b)))
     }
-}
-
-fn error_of(catalogue: &Catalogue, tier: usize) -> f64 {
-    catalogue.tiers[tier].relative_l2_median
 }
 
 #[cfg(test)]
