@@ -33,13 +33,15 @@ class Feel:
     def frame(self, head: bytes, sed_j_per_m3: NDArray[Any], pressure_pa: NDArray[Any]) -> bytearray: ...
 
 class Models:
-    """A network of a folder with its atlas and a contact model, read once; sessions share it."""
+    """The networks of a folder for clients who name none, or the one named; sessions share them."""
 
     def __new__(
         cls, folder: str | PathLike[str], tier: str | None = None, contact: str | PathLike[str] | None = None
     ) -> Models: ...
     @property
     def name(self) -> str: ...
+    @property
+    def names(self) -> list[str]: ...
     @property
     def atlas_hash(self) -> str: ...
     @property

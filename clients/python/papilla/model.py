@@ -70,7 +70,10 @@ class Model:
     def __init__(
         self, tier: str | None = None, *, models: str | os.PathLike[str] | None = None, contact: bool = False
     ) -> None:
-        """Reads a network, the folder's default without a name, and the contact model if `contact` says so.
+        """Reads a network, and the contact model if `contact` says so.
+
+        Without a name these are the networks that a service takes for a client who names none: one for
+        pressure, which `sed` and `render` use, and one for poses and gaps, which sessions use.
 
         `models` is a folder with index.json; without it $PAPILLA_MODELS, or the models of the wheel.
         Raises BadModels and NativeMissing.
@@ -81,7 +84,7 @@ class Model:
 
     @property
     def tier(self) -> str:
-        """Name of the network."""
+        """Name of the network for maps of pressure."""
         return self._native.name
 
     @property

@@ -23,7 +23,8 @@ use crate::{
 /// How often Ctrl-C is looked for.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// A network of a folder with its atlas and a contact model, read once; sessions share it.
+/// The networks of a folder for clients who name none, or the one named, with atlas and contact model,
+/// read once; sessions share them.
 #[pyclass(frozen, module = "papilla._native")]
 pub(crate) struct Models {
     model: Arc<Model>,
@@ -33,7 +34,8 @@ pub(crate) struct Models {
 
 #[pymethods]
 impl Models {
-    /// Reads a network of a folder, the index's default without a name, and a contact model.
+    /// Reads a network of a folder and a contact model. Without a name these are the index's default and
+    /// its default for pressure.
     #[new]
     #[pyo3(signature = (folder, tier=None, contact=None))]
     fn new(
