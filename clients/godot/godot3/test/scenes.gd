@@ -1,4 +1,5 @@
-# Runs a node or a scene until it has shown maps, named in PAPILLA_NODE.
+# Runs a node or a scene, named in PAPILLA_NODE, until it has shown a map, or felt something. PAPILLA_PICTURE: what the scene then
+# looks like goes into that file.
 extends SceneTree
 
 const PATIENCE_MS = 60000
@@ -14,8 +15,7 @@ func _initialize():
 	if path.ends_with(".tscn"):
 		_node = load(path).instance()
 		_node.get_node("Session").url = _url
-		_node.get_node("Session").hello = preload("res://addons/papilla/hello.gd").new().with({"tier": "half-space"})
-		_node.get_node("Session").connect("map_received", self, "_on_map")
+		_node.get_node("Session").connect("touched", self, "_on_map")
 	else:
 		_node = Node.new()
 		_node.set_script(load(path))
@@ -32,13 +32,23 @@ func _on_map(answer):
 
 
 func _idle(_delta):
-	var due = 20 if _node.get("maps") != null else 1
-	if _maps >= due and (_node.get("maps") == null or _node.maps >= due):
-		print("%d maps, the last with %d bytes" % [_maps, _last.samples.size()])
+	var is_scene = _node.get("touches") != null
+	if _maps > 0 and (not is_scene or _node.touches >= 20 and _node.get_node("Arrow").transform.basis.y.length() > 0.2 * _node.arrow_m_per_n):
+		if is_scene:
+			print("touched %d times in %d answers" % [_node.touches, _maps])
+		_save(OS.get_environment("PAPILLA_PICTURE"))
 		quit(0)
 		return true
 	if OS.get_ticks_msec() > PATIENCE_MS:
-		print("%d maps in %d ms" % [_maps, PATIENCE_MS])
+		print("%d answers in %d ms" % [_maps, PATIENCE_MS])
 		quit(1)
 		return true
 	return false
+
+
+func _save(file):
+	if file == "":
+		return
+	var picture = root.get_texture().get_data()
+	picture.flip_y()
+	picture.save_png(file)

@@ -7,7 +7,7 @@ public static class HandsScene
     public const double PitchM = 0.03;
     public static readonly double[] HalfM = { 0.01, 0.003, 0.003 };
 
-    /// <summary>A ball of rubber, a plate and a bar; SED comes at the vertices of the skin.</summary>
+    /// <summary>A ball of rubber, a plate and a bar; SED and displacement come at the vertices of the skin.</summary>
     public static Hello Hello()
     {
         return new Hello
@@ -19,6 +19,7 @@ public static class HandsScene
                 new TouchObject { Shape = new CylinderShape() },
             },
             AnswerLayout = SampleLayout.Vertices,
+            Displacement = true,
             Effects = { new ShearEnergyEffect() },
         };
     }

@@ -17,16 +17,22 @@ public sealed class PapillaHands : MonoBehaviour
     [SerializeField] Transform rig = null;
     [SerializeField] Camera head = null;
     [Tooltip("SED that is drawn in the darkest colour, J/m3")]
-    [SerializeField] float sedOfDarkest = 300;
+    [SerializeField] float sedOfDarkest = 100;
     [Tooltip("Length of the arrow for 1 N, m")]
-    [SerializeField] float arrowMPerN = 0.01f;
+    [SerializeField] float arrowMPerN = 0.06f;
 
     static readonly Color32 Pale = new Color32(219, 168, 143, 255), Dark = new Color32(120, 0, 60, 255);
+    // The skin is drawn so much above what it touches, or both surfaces would show through each other.
+    const float LiftMm = 0.1f;
+    // Where the finger was in the last frames, by their sequences: it is drawn where it was when it felt what comes back.
+    readonly Place[] sent = new Place[256];
     readonly List<Vector3> arrowAt = new List<Vector3>();
     Papilla.Pose[] poses;
     Session session;
     Mesh skin;
     Color32[] colours;
+    Vector3[] vertices;
+    Papilla.Atlas atlas;
     volatile Papilla.Atlas loaded;
     volatile bool isLost;
     bool isInHeadset;
@@ -49,25 +55,27 @@ public sealed class PapillaHands : MonoBehaviour
         FollowHead();
         Place found;
         if (!HandJoints.TryFinger(rig, out found)) found = WithoutHand();
-        var at = found.ToUnity();
-        finger.SetPositionAndRotation(at.position, at.rotation);
-        for (int k = 0; k < poses.Length; k++) poses[k] = objects[k].PoseInFinger(finger);
-        session.SendPoses(poses);
+        for (int k = 0; k < poses.Length; k++) poses[k] = Papilla.Pose.FromUnity(found, objects[k].ToPlace());
+        sent[session.SendPoses(poses) % sent.Length] = found;
         Answer answer;
-        if (session.TryTakeLatest(out answer)) Show(answer);
-        else if (isLost) Show(null);
+        if (session.TryTakeLatest(out answer)) Show(answer, sent[answer.Sequence % sent.Length]);
+        else if (isLost || session.Ready == null) Show(null, found);
     }
 
-    void Draw(Papilla.Atlas atlas)
+    void Draw(Papilla.Atlas of)
     {
+        atlas = of;
+        vertices = new Vector3[atlas.VertexCount];
         skin = atlas.ToMesh();
         colours = new Color32[atlas.VertexCount];
         finger.GetComponent<MeshFilter>().sharedMesh = skin;
     }
 
-    /// <summary>null: nothing is felt.</summary>
-    void Show(Answer answer)
+    /// <param name="answer">null: nothing is felt</param>
+    void Show(Answer answer, Place place)
     {
+        var at = place.ToUnity();
+        finger.SetPositionAndRotation(at.position, at.rotation);
         bool isFelt = answer != null && !answer.NoContact;
         arrow.gameObject.SetActive(isFelt);
         if (isFelt)
@@ -79,7 +87,19 @@ public sealed class PapillaHands : MonoBehaviour
         }
         if (skin == null) return;
         var sed = isFelt ? answer.Sed : null;
-        for (int k = 0; k < colours.Length; k++) colours[k] = Color32.Lerp(Pale, Dark, sed == null ? 0 : sed[k] / sedOfDarkest);
+        for (int k = 0; k < colours.Length; k++)
+        {
+            float x = atlas.SkinMm[3 * k], y = atlas.SkinMm[3 * k + 1], z = atlas.SkinMm[3 * k + 2];
+            if (isFelt)
+            {
+                x += answer.DisplacementMm[3 * k];
+                y += answer.DisplacementMm[3 * k + 1];
+                z += answer.DisplacementMm[3 * k + 2] + LiftMm;
+            }
+            Frames.ToUnity(x, y, z, out vertices[k].x, out vertices[k].y, out vertices[k].z);
+            colours[k] = Color32.Lerp(Pale, Dark, sed == null ? 0 : sed[k] / sedOfDarkest);
+        }
+        skin.vertices = vertices;
         skin.colors32 = colours;
     }
 

@@ -5,6 +5,8 @@ Shader "Papilla/Vertex colours"
     SubShader
     {
         Tags { "RenderType" = "Opaque" }
+        // The skin is open towards the nail: from above one sees its inside.
+        Cull Off
         Pass
         {
             CGPROGRAM

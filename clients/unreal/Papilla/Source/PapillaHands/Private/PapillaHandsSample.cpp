@@ -24,6 +24,10 @@ constexpr double TopCm = -1.0;
 constexpr double PadBehindCm = 1.125, PadBelowCm = 0.65;
 // Half the heights of ball, plate and bar.
 constexpr double HalfCm[] = {1.0, 0.3, 0.3};
+// The skin is drawn so much above what it touches, or both surfaces would show through each other.
+constexpr double LiftMm = 0.1;
+// A power of two.
+constexpr int32 SentMax = 256;
 const FLinearColor Pale(0.72f, 0.39f, 0.27f), Dark(0.19f, 0.0f, 0.05f);
 
 FPapillaObject Object(EPapillaShapeKind Kind)
@@ -69,6 +73,7 @@ APapillaHandsSample::APapillaHandsSample()
     Session->Hello.Objects = {Rubber, Object(EPapillaShapeKind::Plate), Object(EPapillaShapeKind::Cylinder)};
     Session->Hello.AnswerLayout = EPapillaSampleLayout::Vertices;
     Session->Hello.bUseShearEnergy = true;
+    Session->Hello.bDisplacement = true;
 }
 
 void APapillaHandsSample::BeginPlay()
@@ -86,12 +91,18 @@ void APapillaHandsSample::Tick(float DeltaTime)
     FTransform Tracked;
     const bool bIsTracked = FindTrackedFinger(Tracked);
     Arrange(bIsTracked ? 1.0 : ScaleOfMouse);
-    Finger = bIsTracked ? Tracked : FingerOfMouse();
-    Skin->SetWorldTransform(Finger);
-    Skin->SetWorldScale3D(FVector::OneVector * WorldScale);
-    Session->SendPoses(Finger, Places, 0, WorldScale);
+    const FTransform Now = bIsTracked ? Tracked : FingerOfMouse();
+    const int32 Sequence = Session->SendPoses(Now, Places, 0, WorldScale);
+    Sent.SetNum(SentMax);
+    Sent[Sequence & (SentMax - 1)] = Now;
     if (Vertices.IsEmpty() && Session->GetSkin(Vertices, Triangles))
     {
+        // Both sides: the skin is open towards the nail, and from above one sees its inside.
+        for (int32 At = Triangles.Num() - 1; At >= 0; --At)
+        {
+            const int32 Corner = Triangles[At];
+            Triangles.Add(Corner);
+        }
         Colours.Init(Pale, Vertices.Num());
         Skin->CreateMeshSection_LinearColor(0, Vertices, Triangles, {}, {}, Colours, {}, false);
     }
@@ -145,6 +156,7 @@ void APapillaHandsSample::Arrange(double Scale)
 
 void APapillaHandsSample::HandleTouched(int32, const FPapillaTouch& Touch)
 {
+    DrawFinger(static_cast<int32>(Session->Latest().sequence));
     FVector Force, Torque, Centre;
     if (!UPapillaFrames::ToWorld(Finger, Touch, Force, Torque, Centre, WorldScale)) return;
     // 100 of Unreal's units are 1 N; the arrow is 80 cm long as it comes.
@@ -155,11 +167,20 @@ void APapillaHandsSample::HandleTouched(int32, const FPapillaTouch& Touch)
     Paint(true);
 }
 
-void APapillaHandsSample::HandleLost(int32, int32)
+void APapillaHandsSample::HandleLost(int32 Sequence, int32)
 {
+    DrawFinger(Sequence);
     // Nothing is known of the touch any more: nothing is shown, and actuators would go to zero.
     Arrow->SetVisibility(false);
     Paint(false);
+}
+
+void APapillaHandsSample::DrawFinger(int32 Sequence)
+{
+    if (Sent.IsEmpty()) return;
+    Finger = Sent[Sequence & (SentMax - 1)];
+    Skin->SetWorldTransform(Finger);
+    Skin->SetWorldScale3D(FVector::OneVector * WorldScale);
 }
 
 void APapillaHandsSample::Paint(bool bIsFelt)
@@ -171,7 +192,14 @@ void APapillaHandsSample::Paint(bool bIsFelt)
         const float Share = bHasSed ? FMath::Clamp(Sed[At] / SedOfDarkest, 0.0f, 1.0f) : 0.0f;
         Colours[At] = FLinearColor(Pale.R + Share * (Dark.R - Pale.R), Pale.G + Share * (Dark.G - Pale.G), Pale.B + Share * (Dark.B - Pale.B));
     }
-    Skin->UpdateMeshSection_LinearColor(0, Vertices, {}, {}, Colours, {});
+    const std::vector<float>& MovedMm = Session->Latest().displacement_mm;
+    const bool bMoves = bHasSed && MovedMm.size() == 3 * static_cast<size_t>(Vertices.Num());
+    Moved = Vertices;
+    for (int32 At = 0; bMoves && At < Moved.Num(); ++At)
+    {
+        Moved[At] = Moved[At] + UPapillaFrames::Drawn(FVector(MovedMm[3 * At], MovedMm[3 * At + 1], MovedMm[3 * At + 2] + LiftMm));
+    }
+    Skin->UpdateMeshSection_LinearColor(0, Moved, {}, {}, Colours, {});
 }
 
 void APapillaHandsGameMode::StartPlay()

@@ -32,11 +32,11 @@ public:
 
     /** SED that is drawn in the darkest colour, J/m3. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
-    float SedOfDarkest = 300.0f;
+    float SedOfDarkest = 100.0f;
 
     /** Length of the arrow for a force of 1 N, mm, as large as life. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
-    float ArrowMmPerN = 10.0f;
+    float ArrowMmPerN = 60.0f;
 
 private:
     UFUNCTION()
@@ -48,6 +48,7 @@ private:
     bool FindTrackedFinger(FTransform& Found) const;
     FTransform FingerOfMouse() const;
     void Arrange(double Scale);
+    void DrawFinger(int32 Sequence);
     void Paint(bool bIsFelt);
 
     UPROPERTY()
@@ -61,9 +62,11 @@ private:
     UPROPERTY()
     TObjectPtr<UCameraComponent> Camera;
 
+    /** Where the finger was in the last frames, by their sequences: it is drawn where it was when it felt what comes back. */
+    TArray<FTransform> Sent;
     FTransform Finger;
     TArray<FTransform> Places;
-    TArray<FVector> Vertices;
+    TArray<FVector> Vertices, Moved;
     TArray<int32> Triangles;
     TArray<float> Sed;
     TArray<FLinearColor> Colours;
