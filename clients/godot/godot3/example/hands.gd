@@ -24,6 +24,7 @@ var touches = 0
 
 # Where the finger was in the last frames, by their sequences: it is drawn where it was when it felt what comes back.
 var _sent = []
+var _was_tracked = false
 var _arrays = []
 # The skin's vertices, mm in the finger's frame.
 var _skin_mm = PoolVector3Array()
@@ -57,6 +58,11 @@ func _ready():
 
 func _process(_delta):
 	var tracked = tracked_finger()
+	_was_tracked = _was_tracked or tracked != null
+	# A hand that was there and is lost is told as that: nothing is felt until it is back.
+	if _was_tracked and tracked == null:
+		_sent[session.send_not_tracked() % SENT_MAX] = null
+		return
 	var hand = _without_hand() if tracked == null else tracked
 	var rows = []
 	for each in objects:

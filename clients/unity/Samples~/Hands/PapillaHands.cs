@@ -35,7 +35,8 @@ public sealed class PapillaHands : MonoBehaviour
     Papilla.Atlas atlas;
     volatile Papilla.Atlas loaded;
     volatile bool isLost;
-    bool isInHeadset;
+    bool isInHeadset, wasTracked;
+    Place last;
 
     void Start()
     {
@@ -54,7 +55,17 @@ public sealed class PapillaHands : MonoBehaviour
         if (skin == null && loaded != null) Draw(loaded);
         FollowHead();
         Place found;
-        if (!HandJoints.TryFinger(rig, out found)) found = WithoutHand();
+        bool isTracked = HandJoints.TryFinger(rig, out found);
+        // A hand that was there and is lost is told as that: nothing is felt until it is back.
+        if (wasTracked && !isTracked)
+        {
+            session.SendNotTracked();
+            Show(null, last);
+            return;
+        }
+        wasTracked = isTracked;
+        if (!isTracked) found = WithoutHand();
+        last = found;
         for (int k = 0; k < poses.Length; k++) poses[k] = Papilla.Pose.FromUnity(found, objects[k].ToPlace());
         sent[session.SendPoses(poses) % sent.Length] = found;
         Answer answer;

@@ -90,6 +90,15 @@ void APapillaHandsSample::Tick(float DeltaTime)
     Seconds += DeltaTime;
     FTransform Tracked;
     const bool bIsTracked = FindTrackedFinger(Tracked);
+    bWasTracked = bWasTracked || bIsTracked;
+    if (bWasTracked && !bIsTracked)
+    {
+        // A hand that was there and is lost is told as that: nothing is felt until it is back.
+        Session->SendNotTracked();
+        Arrow->SetVisibility(false);
+        Paint(false);
+        return;
+    }
     Arrange(bIsTracked ? 1.0 : ScaleOfMouse);
     const FTransform Now = bIsTracked ? Tracked : FingerOfMouse();
     const int32 Sequence = Session->SendPoses(Now, Places, 0, WorldScale);
@@ -156,6 +165,7 @@ void APapillaHandsSample::Arrange(double Scale)
 
 void APapillaHandsSample::HandleTouched(int32, const FPapillaTouch& Touch)
 {
+    if (Session->Latest().not_tracked) return;
     DrawFinger(static_cast<int32>(Session->Latest().sequence));
     FVector Force, Torque, Centre;
     if (!UPapillaFrames::ToWorld(Finger, Touch, Force, Torque, Centre, WorldScale)) return;

@@ -72,6 +72,7 @@ private:
     TArray<FLinearColor> Colours;
     double WorldScale = 0.0;
     double Seconds = 0.0;
+    bool bWasTracked = false;
 };
 
 /** Any level shows the sample with `?game=/Script/PapillaHands.PapillaHandsGameMode` behind its name. */
