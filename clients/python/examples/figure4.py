@@ -16,7 +16,7 @@ import numpy as np
 import papilla
 
 url = os.environ.get("PAPILLA_URL", papilla.DEFAULT_URL)
-tier = "large"
+tier = "small-maps"
 indentations = [papilla.indentation(number, url=url) for number in (0, 1, 2)]
 predictions = [papilla.sed(indentation.pressure_pa, url=url, tier=tier) for indentation in indentations]
 

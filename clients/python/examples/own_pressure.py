@@ -13,7 +13,7 @@ pressure_pa = atlas.contacts(bumps)
 # A coarse mesh, to be quick; leave density and order out for one on which SED is good.
 scene = {"geometry": {"kind": "fingertip", "density": "coarse", "order": "linear"}, "pressure": {"increments": 1}}
 state = fe.Scene(scene, pressure=pressure_pa).run(fields=False)[-1]
-network = papilla.Model("small").sed(pressure_pa)
+network = papilla.Model().sed(pressure_pa)
 print(f"{state.force_n[2]:.3f} N, {state.depth_mm:.2f} mm deep, flags {state.flags}")
 print(f"SED at most {state.sed_j_per_m3.max():.0f} J/m3 by these elements, {network.max():.0f} J/m3 by the network")
 

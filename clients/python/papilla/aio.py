@@ -33,7 +33,7 @@ TIMEOUT_S: Final = 5.0
 class AsyncSession:
     """A session: pressure maps in, SED maps out, the latest frame wins.
 
-    `async with AsyncSession(tier="small") as session: (await session.render(pressure_pa)).sed`
+    `async with AsyncSession() as session: (await session.render(pressure_pa)).sed`
 
     The arguments after `url` and `token` are the members of the protocol's hello
     (docs/reference/protocol-hello.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and

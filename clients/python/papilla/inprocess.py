@@ -181,7 +181,7 @@ def _bytes(samples: NDArray[Any]) -> bytes | memoryview:
 def local(model: Model | None = None, *, models: str | os.PathLike[str] | None = None, **hello: Any) -> LocalSession:
     """A session in this process, with the methods and the answers of `Session(url)`.
 
-    `with papilla.local(tier="small") as session: session.render(pressure_pa).sed`
+    `with papilla.local() as session: session.render(pressure_pa).sed`
 
     `models` is a folder of models, by default that of the wheel; `model` is one that is loaded already. The
     rest are members of the hello, as for `Session`; `budget_us`, `stale_after_us` and `resume` are refused,

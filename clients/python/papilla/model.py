@@ -64,7 +64,7 @@ class Rendered(NamedTuple):
 class Model:
     """A network of a folder of models, read once and used in this process.
 
-    `papilla.Model("small").sed(pressure_pa)`
+    `papilla.Model().sed(pressure_pa)`
     """
 
     def __init__(

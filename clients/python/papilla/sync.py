@@ -24,7 +24,7 @@ _T = TypeVar("_T")
 class Session(Calls):
     """As `AsyncSession`, on a thread of its own; can be used from several threads.
 
-    `with Session(tier="small") as session: session.render(pressure_pa).sed`
+    `with Session() as session: session.render(pressure_pa).sed`
     """
 
     def __init__(

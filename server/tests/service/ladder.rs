@@ -195,10 +195,15 @@ async fn sessions_get_the_network_that_learnt_what_they_give() {
             let ready = socket.open(contact::ball_hello(&budget)).await;
             assert_eq!(ready["tier"], "slow", "{budget}, {ladder:?}");
         }
-        // Whoever names a tier gets it.
+        // Whoever names a tier gets it, and is told of the other one.
         let named = json!({"tier": "quick"});
         let mut socket = service.socket().await;
-        assert_eq!(socket.open(contact::ball_hello(&named)).await["tier"], "quick");
+        let ready = socket.open(contact::ball_hello(&named)).await;
+        assert_eq!(
+            (&ready["tier"], &ready["warnings"][0]["member"]),
+            (&json!("quick"), &json!("tier"))
+        );
+        assert!(ready["warnings"][0]["question"].as_str().unwrap().contains("that of slow"));
     }
 }
 

@@ -63,6 +63,8 @@ pub(super) struct Terms {
     pub(super) follows: Option<Shape>,
     /// What became of the sealed state that came with the hello; None if there was none.
     pub(super) resumption: Option<Resumption>,
+    /// Where the session's pressure comes from.
+    given: Given,
     /// What `ready` says of the effects.
     info: ReadyInfo,
     /// The fingers as they were when the terms were agreed on. `ready` takes them, so that a
@@ -328,6 +330,7 @@ fn agree(
         _fingers: fingers,
         follows: (hello.reconnect == Some(true)).then(|| Shape::of(hello)),
         resumption: None,
+        given,
         info,
         agreed: loaded,
     })
@@ -409,6 +412,8 @@ pub(super) fn ready(app: &App, number: u64, terms: &mut Terms) -> Ready {
     let fingers = || agreed.iter().enumerate();
     let finger_terms = || fingers().map(|(finger, of)| finger_terms(terms, finger, of)).collect();
     let borrowed = fingers().filter_map(|(finger, of)| borrowed(terms, finger, of));
+    let unlearnt = unlearnt(terms.given, tier, &of_first.catalogue);
+    let unlearnt = unlearnt.filter(|_| terms.info.shows_sed);
     Ready {
         version: PROTOCOL_VERSION.into(),
         session: number,
@@ -436,7 +441,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &mut Terms) -> Ready {
         contact_us: terms.parts.iter().filter_map(|part| part.contact_us).max(),
         method: hand.method(),
         expected_error: expected_error(terms, 0, of_first),
-        warnings: hand.warnings().iter().cloned().chain(borrowed).collect(),
+        warnings: hand.warnings().iter().cloned().chain(borrowed).chain(unlearnt).collect(),
     }
 }
 
@@ -504,6 +509,25 @@ fn finger_terms(terms: &Terms, finger: usize, of: &Loaded) -> FingerTerms {
         expected_error: expected_error(terms, finger, of),
         units: terms.info.units.get(finger).cloned().flatten(),
     }
+}
+
+/// The warning about a tier that the hello names and that did not learn such pressure as it will get,
+/// where the default did.
+fn unlearnt(given: Given, tier: &Tier, catalogue: &Catalogue) -> Option<Warning> {
+    let default = &catalogue.tiers[catalogue.default_for(given)];
+    if tier.suits(given) || !default.suits(given) {
+        return None;
+    }
+    let (learnt, gets) = match given {
+        Given::Pressure => ("that contact finds from poses", "pressure that the client sends"),
+        Given::Contact => ("of simulations", "the pressure that contact finds from poses and gaps"),
+    };
+    let question = format!(
+        "tier {} learnt the pressure {learnt}; from {gets} its SED is further off than that of \
+         {}, which a hello without 'tier' gets",
+        tier.name, default.name
+    );
+    Some(Warning { member: "tier".to_owned(), value: None, question })
 }
 
 /// The warning about a finger whose network was trained on another finger.
