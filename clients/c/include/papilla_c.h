@@ -163,8 +163,9 @@ PapillaModel *papilla_model_new(void);
 void papilla_model_free(PapillaModel *model);
 /* What the last failed call with the handle said, for people; empty after one that went well. */
 const char *papilla_model_error(const PapillaModel *model);
-/* Reads index.json, atlas.json, TIER.onnx and TIER.json of a folder (tier NULL: the index's
- * default), and a contact model of `fe-datagen contact` (NULL: none). Paths are UTF-8. Takes
+/* Reads index.json, atlas.json, TIER.onnx and TIER.json of a folder (tier NULL: of the index's
+ * defaults, one for maps of pressure and one for poses and gaps; a session uses the one for its
+ * input), and a contact model of `fe-datagen contact` (NULL: none). Paths are UTF-8. Takes
  * seconds. Sessions keep the model that they were opened with. */
 PapillaStatus papilla_model_load(PapillaModel *model, const char *folder, const char *tier, const char *contact);
 /* Pointers of info stay valid until the next load, or the end of the handle. */
