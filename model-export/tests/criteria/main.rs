@@ -16,8 +16,11 @@ use serde_json::Value;
 
 const PRESSES: &str = "heldout-presses";
 const SHAPES: &str = "heldout-shapes";
-/// All files of `models/` together, bytes.
-const MODELS_BYTES_MAX: u64 = 20_000_000;
+/// What contact finds from the poses of both.
+const POSES: &str = "poses";
+/// All files of `models/` together, bytes. Two networks for pressure beside those for poses are 2.2 MB
+/// of it.
+const MODELS_BYTES_MAX: u64 = 22_000_000;
 
 fn models() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../models")
@@ -68,18 +71,18 @@ fn a_model_of_a_millisecond_beats_the_published_network_in_every_figure_but_the_
 }
 
 /// What was asked for: 6 % in the median and 12 % at the 95th percentile, 10 % on unseen shapes.
-/// `large-maps` has 5.2 and 9.5 % off the reference, 6.0 and 11.4 off twelve more presses of it, 6.7 and
-/// 11.2 off held-out simulations of the teacher, 7.7 off unseen shapes. These limits hold what it and
-/// `large`, the best from poses, reached (docs/concepts/networks.md), so that none is lost.
+/// From pressure `large-maps` has 5.2 and 9.5 % off the reference, 6.0 and 11.4 off twelve more presses
+/// of it, 6.7 and 11.2 off held-out simulations of the teacher, 7.7 off unseen shapes. These limits hold
+/// what it and `small-maps`, the default, reached (docs/concepts/networks.md), so that none is lost.
 #[test]
 fn the_best_networks_are_as_accurate_as_the_documents_say() {
     let ladder = ladder();
     let best = best(&ladder);
     assert_eq!(best.name, "large-maps");
-    let large = ladder.rungs.iter().find(|row| row.name == "large").unwrap();
+    let small = ladder.rungs.iter().find(|row| row.name == "small-maps").unwrap();
     for (row, limits) in [
         (best, [0.054, 0.098, 0.069, 0.115, 0.079, 0.122]),
-        (large, [0.07, 0.098, 0.092, 0.135, 0.1, 0.125]),
+        (small, [0.068, 0.1, 0.083, 0.123, 0.083, 0.135]),
     ] {
         let (indentations, shapes) = (errors(row, PRESSES), errors(row, SHAPES));
         let reference = errors(row, "reference").relative_l2;
@@ -99,12 +102,36 @@ fn the_best_networks_are_as_accurate_as_the_documents_say() {
     assert!(nail_base(best) <= 0.25 * nail_base(baseline(&ladder)));
 }
 
+/// From poses, as most sessions are: median and 95th percentile that were reached. Of each size the
+/// network for poses is the more accurate from poses, and the one for pressure from pressure.
+#[test]
+fn each_size_has_a_network_for_poses_and_one_for_pressure() {
+    let ladder = ladder();
+    let row = |name: &str| ladder.rungs.iter().find(|row| row.name == name).unwrap();
+    for (name, median, p95) in
+        [("nano", 0.098, 0.16), ("small", 0.085, 0.147), ("large", 0.08, 0.136)]
+    {
+        let reached = errors(row(name), POSES).relative_l2;
+        assert!(reached.median <= median && reached.p95 <= p95, "{name}: {reached:?}");
+    }
+    for name in ["nano", "small", "large"] {
+        let (for_poses, for_pressure) = (row(name), row(&format!("{name}-maps")));
+        let median = |row: &Rung, set| errors(row, set).relative_l2.median;
+        assert!(median(for_poses, POSES) < median(for_pressure, POSES), "{name}");
+        for set in [PRESSES, SHAPES] {
+            assert!(median(for_pressure, set) < median(for_poses, set), "{name}, {set}");
+        }
+    }
+}
+
 /// Traction explains a good part of what networks of pressure alone miss, wherever it was measured.
 #[test]
 fn what_traction_adds_brings_every_network_closer() {
     let found = ladder().traction;
-    let ours: Vec<_> =
-        found.iter().filter(|t| ["nano", "small", "large"].contains(&t.model.as_str())).collect();
+    let ours: Vec<_> = found
+        .iter()
+        .filter(|t| ["nano-maps", "small-maps", "large-maps"].contains(&t.model.as_str()))
+        .collect();
     let sets: std::collections::BTreeSet<_> = ours.iter().map(|t| t.set.as_str()).collect();
     assert_eq!(sets.into_iter().collect::<Vec<_>>(), ["friction", "sliding"]);
     for t in ours {

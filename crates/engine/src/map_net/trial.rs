@@ -5,7 +5,12 @@ use crate::{EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, trial_map};
 use std::sync::Arc;
 
 /// Greatest difference between the answers that counts as rounding, relative to the greatest value.
-pub(super) const DIFFERENCE_MAX: f32 = 1e-5;
+///
+/// The trial maps go far beyond the pressures of any training, where sums that nearly cancel round most:
+/// of the shipped networks `small` differs most, by 1.02e-5. From the pressures of finite elements both
+/// agree to 1e-5 (the cards' `onnxruntime_difference_max`). A network that is read wrongly differs by
+/// parts of a hundred.
+pub(super) const DIFFERENCE_MAX: f32 = 3e-5;
 
 /// How a model is to be run.
 pub(crate) enum Preferred {
