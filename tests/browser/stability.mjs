@@ -17,7 +17,7 @@ function rowsOf(csv) {
 
 /** Cases: name, what is promised, and each variant with how it ended and why. */
 export function casesOf(report, csv) {
-  const promises = new Map(Array.from(report.matchAll(/^\| `(.+?)` \| (.+?) \|/gm), ([, name, about]) => [name, about]));
+  const promises = new Map(Array.from(report.matchAll(/^\| `(.+?)` \| ([^|]+) \| \d+ \|$/gm), ([, name, about]) => [name, about]));
   const cases = new Map();
   for (const { case: name, variant, end, error, 'nearest to its tolerance': nearest } of rowsOf(csv)) {
     if (!promises.has(name)) throw new Error(`${name} of the table is no case of the report`);
