@@ -40,7 +40,7 @@ const objects = (list) => ({ input: 'objects', pressure: 'map', objects: list })
 
 /**
  * The cases. `make(atlas, mostPa)` gives the terms and the frames: maps of pressure or poses, the last of
- * which is the case. `needsContact`: only a server with a contact model takes it.
+ * which is the case. `needsContact`: its frames are poses, which only a server with a contact model takes.
  */
 export const CASES = [
   { name: 'Checkerboard', sent: '20 kPa on every other pixel: no skin presses like that', make: () => ({
@@ -146,11 +146,10 @@ function picture(values, table, label) {
 }
 
 export class HardCases {
-  /** `mostPa()`, `tier()`: of the session that runs. */
-  constructor(atlas, hasContact, mostPa, tier) {
+  /** `tierFor(given)`: the listed tier that answers now, or its sibling that learnt what is given; or null. */
+  constructor(atlas, hasContact, tierFor) {
     this.atlas = atlas;
-    this.mostPa = mostPa;
-    this.tier = tier;
+    this.tierFor = tierFor;
     this.running = null;
     const list = CASES.filter(({ needsContact }) => hasContact || !needsContact);
     this.buttons = list.map((hardCase) => {
@@ -174,13 +173,15 @@ export class HardCases {
     const mine = {};
     this.running = mine;
     box.dataset.state = 'sent';
-    const outcome = await sendCase(hardCase, this.atlas, this.mostPa(), this.tier());
-    if (this.running === mine) this.#show(box, hardCase, outcome);
+    const tier = this.tierFor(hardCase.needsContact ? 'poses' : 'pressure');
+    const mostPa = tier?.pressure_max_pa ?? NaN;
+    const outcome = await sendCase(hardCase, this.atlas, mostPa, tier?.name ?? null);
+    if (this.running === mine) this.#show(box, hardCase, outcome, mostPa);
   }
 
-  #show(box, hardCase, outcome) {
+  #show(box, hardCase, outcome, mostPa) {
     const { answer, frame, isMap } = outcome;
-    const verdict = verdictOf(outcome, this.mostPa());
+    const verdict = verdictOf(outcome, mostPa);
     const pictures = document.createElement('div');
     pictures.className = 'pictures';
     const pressure = isMap ? frame : answer?.pressurePa;

@@ -2,7 +2,8 @@
 // Times of rungs that this server serves are its own calibration, the others' are those shipped.
 
 import { fetchJson } from './replay.mjs';
-import { aboutMethod, aboutSet, aboutTier, nameOfMethod, nameOfSet, nameOfTier } from './words.mjs';
+import { errorFrom, setFor, suiting, suits } from './tiers.mjs';
+import { aboutMethod, aboutSet, aboutTier, nameOfMethod, nameOfOthers, nameOfSet, nameOfTier } from './words.mjs';
 
 const SVG = 'http://www.w3.org/2000/svg';
 const MARGIN = { left: 52, right: 14, top: 12, bottom: 38 };
@@ -95,12 +96,15 @@ export function placeName(taken, x, y, width, right) {
 const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
 const least = (among, key) => among.reduce((a, b) => (a === undefined || b[key] < a[key] ? b : a), undefined);
 
-/** Ways to answer a frame, each with its time, ms: every network, with every contact method where frames are poses. */
-function waysOf({ tiers, methods }, isContact) {
-  const networks = tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form');
-  const contacts = isContact && methods ? methods : [null];
+/**
+ * Ways to answer a frame, each with its time, ms: every network that learnt what is given, with every
+ * contact method where frames are poses.
+ */
+function waysOf({ tiers, methods }, given) {
+  const networks = suiting(tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form'), given);
+  const contacts = given === 'poses' && methods ? methods : [null];
   return networks.flatMap((tier) => contacts.map((method) => ({
-    tier: tier.name, error: tier.relative_l2_median, method: method?.name ?? null, ms: (tier.predicted_latency_us + (method?.contact_us ?? 0)) / 1000,
+    tier: tier.name, error: errorFrom(tier, given), method: method?.name ?? null, ms: (tier.predicted_latency_us + (method?.contact_us ?? 0)) / 1000,
     contactError: method?.errors?.[0]?.pressure_relative_l2.median ?? 0,
   })));
 }
@@ -109,10 +113,10 @@ function waysOf({ tiers, methods }, isContact) {
  * What to do where frames are late, or in words that nothing is that fast: the most accurate way within
  * the budget, of networks alone, since a closed form is another thing than a fast network.
  */
-export function adviseTier(listing, { tier, method, budgetMs, isContact }) {
-  const ways = waysOf(listing, isContact);
+export function adviseTier(listing, { tier, method, budgetMs, given }) {
+  const ways = waysOf(listing, given);
   if (ways.length === 0) return { text: 'raise the budget' };
-  const meeting = ways.filter((way) => way.ms <= budgetMs && (way.tier !== tier || (isContact && way.method !== method)));
+  const meeting = ways.filter((way) => way.ms <= budgetMs && (way.tier !== tier || (given === 'poses' && way.method !== method)));
   const said = (way) => `${nameOfTier(way.tier)}${way.method && way.method !== method ? ` with contact ${nameOfMethod(way.method)}` : ''}`;
   const best = least(meeting.map((way) => ({ ...way, sum: Math.hypot(way.error, way.contactError) })), 'sum');
   if (best) return { text: `raise the budget or take ${said(best)}`, tier: best.tier, method: best.method };
@@ -120,19 +124,35 @@ export function adviseTier(listing, { tier, method, budgetMs, isContact }) {
   return { text: `no model is that fast here; the fastest, ${said(fastest)}, takes some ${short(fastest.ms)} ms`, tier: fastest.tier, method: fastest.method };
 }
 
-/** What the server says of its tiers; they go into the choices. */
-export async function listTiers() {
-  const listing = await fetchJson('v1/tiers');
-  const options = listing.tiers.map((tier) => {
+function optionOf(tier, text, value, given) {
+  const option = new Option(text, value);
+  option.title = aboutTier(tier.name, tier, given);
+  return option;
+}
+
+/** The tiers as the choices of the model, each with its error from what is given; first those that learnt it. */
+export function offerTiers({ tiers }, given) {
+  const select = byId('tier');
+  const chosen = select.value;
+  const [byBudget] = select.options;
+  const option = (tier) => {
     // As in the plot: the model alone, as measured here when the service started.
     const ms = showTime((tier.calibrated_us?.p50 ?? tier.predicted_latency_us) / 1000);
-    const error = tier.relative_l2_median > 0 ? `, ${oneDigit(100 * tier.relative_l2_median)} % off` : '';
-    const option = new Option(`${nameOfTier(tier.name)} (${ms}${error})`, tier.name);
-    option.title = aboutTier(tier.name);
-    return option;
-  });
-  byId('tier').append(...options);
-  byId('with').append(...listing.tiers.map((tier) => new Option(nameOfTier(tier.name), `tier:${tier.name}`)));
+    const error = errorFrom(tier, given);
+    return optionOf(tier, `${nameOfTier(tier.name)} (${ms}${error > 0 ? `, ${oneDigit(100 * error)} % off` : ''})`, tier.name, given);
+  };
+  const others = Object.assign(document.createElement('optgroup'), { label: nameOfOthers(given) });
+  others.append(...tiers.filter((tier) => !suits(tier, given)).map(option));
+  select.replaceChildren(byBudget, ...tiers.filter((tier) => suits(tier, given)).map(option), ...(others.childElementCount > 0 ? [others] : []));
+  select.value = chosen;
+}
+
+/** What the server says of its tiers and methods; they go into the choices. */
+export async function listTiers() {
+  const listing = await fetchJson('v1/tiers');
+  const given = listing.methods === null ? 'pressure' : 'poses';
+  offerTiers(listing, given);
+  byId('with').append(...listing.tiers.map((tier) => optionOf(tier, nameOfTier(tier.name), `tier:${tier.name}`, given)));
   for (const method of listing.methods ?? []) {
     const name = nameOfMethod(method.name);
     const option = new Option(`${name} (${oneDigit(method.contact_us / 1000)} ms)`, method.name);
@@ -153,8 +173,9 @@ function make(parent, tag, attributes, text) {
 
 export class LadderView {
   /** `data` as /v1/tiers gives it; `choose(tier)` is called with the name of the rung clicked. */
-  constructor(data, choose) {
+  constructor(data, given, choose) {
     this.data = data;
+    this.given = given;
     this.choose = choose;
     this.svg = byId('ladder-plot');
     this.select = byId('ladder-set');
@@ -163,8 +184,8 @@ export class LadderView {
     this.budgetMs = NaN;
     this.live = null;
     this.select.replaceChildren(...setsOf(data).map((set) => new Option(nameOfSet(set), set)));
-    // The set of the README's table and of the choices, so that all say the same.
-    if (data.judged_on) this.select.value = data.judged_on;
+    // The set of the errors in the choices, so that all say the same.
+    this.select.value = setFor(data, setsOf(data), given);
     this.select.addEventListener('change', () => this.draw());
     byId('ladder-machine').textContent = data.ladder ? `Shipped figures: ${data.ladder.machine}.` : '';
     new ResizeObserver(() => this.draw()).observe(this.svg);
@@ -190,6 +211,14 @@ export class LadderView {
       follow(event);
     });
     svg.addEventListener('pointermove', (event) => { if (svg.hasPointerCapture(event.pointerId)) follow(event); });
+  }
+
+  /** Other things are given: the set that judges that is shown, unless the visitor had chosen another one. */
+  setGiven(given) {
+    const sets = setsOf(this.data);
+    if (this.select.value === setFor(this.data, sets, this.given)) this.select.value = setFor(this.data, sets, given);
+    this.given = given;
+    this.draw();
   }
 
   /** The session has new terms. */
@@ -280,7 +309,7 @@ export class LadderView {
     for (const rung of rungs) {
       const [x, y] = [this.x(rung.timeMs), this.y(rung.error)];
       const group = make(svg, 'g', { class: `rung ${rung.kind}` });
-      make(group, 'title', {}, `${nameOfTier(rung.name)} (${KINDS[rung.kind] ?? rung.kind}): ${showError(rung.error)} in ${showTime(rung.timeMs)}. ${aboutTier(rung.name)}`);
+      make(group, 'title', {}, `${nameOfTier(rung.name)} (${KINDS[rung.kind] ?? rung.kind}): ${showError(rung.error)} in ${showTime(rung.timeMs)}. ${aboutTier(rung.name, this.data.tiers.find(({ name }) => name === rung.tier), this.given)}`);
       if (rung.tier) this.#button(group, rung);
       if (rung.tier !== null && rung.tier === this.running) make(group, 'circle', { class: 'ring', cx: x, cy: y, r: DOT_PX + 4 });
       if (rung.kind === 'fe') make(group, 'path', { class: rung.reference ? 'dot hollow' : 'dot', d: `M${x} ${y - 6}l6 6l-6 6l-6 -6z` });
@@ -329,7 +358,7 @@ export class LadderView {
   #words(serverMs, error) {
     const rung = this.rungs?.find(({ tier }) => tier === this.running);
     const parts = [];
-    if (rung) parts.push(`${nameOfTier(rung.name)}: ${showError(rung.error)} off on ${nameOfSet(this.select.value)}, ${showTime(rung.timeMs)} alone`);
+    if (rung) parts.push(`${nameOfTier(rung.name)}: ${showError(rung.error)} off (${nameOfSet(this.select.value)}), ${showTime(rung.timeMs)} alone`);
     else if (this.running) parts.push(`${nameOfTier(this.running)}: not on this set`);
     if (serverMs > 0) parts.push(`now ${showTime(serverMs)} in the server${this.ready?.method ? ' with contact' : ''}`);
     if (error > 0) parts.push(`${showError(error)} on this frame`);

@@ -9,7 +9,7 @@ import { EffectSwitches } from './effects.mjs';
 import { FingerView } from './finger.mjs';
 import { HandView } from './fingers.mjs';
 import { HardCases } from './hard.mjs';
-import { LadderView, adviseTier, listTiers } from './ladder.mjs';
+import { LadderView, adviseTier, listTiers, offerTiers } from './ladder.mjs';
 import { MapView } from './map.mjs';
 import { countDifferences } from './mask.mjs';
 import { meshOf } from './mesh.mjs';
@@ -22,8 +22,9 @@ import { hashOf, npyOf, pictureOf, pythonOf, save, stateOf } from './share.mjs';
 import { SpikeView } from './spikes.mjs';
 import { SureBar } from './sure.mjs';
 import { themeButton } from './theme.mjs';
+import { defaultFor, suiting, suits, tierAfter, tierFor } from './tiers.mjs';
 import { Timeline } from './timeline.mjs';
-import { flagsOf, nameOfMethod, nameOfTier } from './words.mjs';
+import { flagsOf, nameOfMethod, nameOfTier, notLearnt } from './words.mjs';
 
 const byId = (id) => document.getElementById(id);
 /** A complaint stays at least this long, then until frames are answered again. */
@@ -37,16 +38,18 @@ const PLAUSIBLE_MM = { least: 3, most: 30 };
 const LACKS = { shear_energy: 'without shear', relaxation: 'without creep' };
 /** What the friction of the switch is, where none was chosen. */
 const FRICTION = 0.5;
+/** What a link says where the budget chooses the model; one that says nothing leads to the service's default. */
+const BY_BUDGET = 'by-budget';
 
 class Page {
   constructor(atlas, listing, effects) {
     this.atlas = atlas;
     this.listing = listing;
-    this.ladder = new LadderView(listing, (tier) => this.#switchTo(tier));
     this.mode = 'press';
     this.press = new Press(atlas);
     /** Null where the server has no contact model: pressure is then this page's estimate. */
     this.contact = listing.methods === null ? null : new Contact(this.press);
+    this.ladder = new LadderView(listing, this.given, (tier) => this.#switchTo(tier));
     document.body.toggleAttribute('data-contact', this.contact !== null);
     if (!this.contact) for (const option of [...byId('with').options]) if (option.value.startsWith('method:')) option.remove();
     this.unsent = true;
@@ -74,7 +77,7 @@ class Page {
     if (this.contact) this.contact.draws = this.finger !== null;
     this.effects = new EffectSwitches(effects, (name, on) => this.#effect(name, on));
     this.comparison = new Comparison((first, second, answer) => this.#showPair(first, second, answer), (message) => notify(message));
-    this.hard = new HardCases(atlas, this.contact !== null, () => this.mostPa, () => this.answered.tier || null);
+    this.hard = new HardCases(atlas, this.contact !== null, (given) => this.#listed(tierFor(listing, this.answered.tier, given)));
     this.session = this.#makeSession();
     this.hand = this.contact && new HandView(atlas, this.press, {
       terms: () => ({ ...this.#terms(), effects: [], error_estimate: false, ...(byId('method').value && { method: byId('method').value }) }),
@@ -168,6 +171,35 @@ class Page {
     return this.contact !== null && this.mode === 'press';
   }
 
+  /** What a press gives, of one finger or of a hand: a pose, of which the server finds the pressure, or a map. */
+  get givenByPress() {
+    return this.contact !== null ? 'poses' : 'pressure';
+  }
+
+  /** What the frames of this mode give: replayed are maps of pressure, whatever a press is. */
+  get given() {
+    return this.mode === 'replay' ? 'pressure' : this.givenByPress;
+  }
+
+  /** The model that is chosen, as a press goes on with it. */
+  get tierOfPress() {
+    return tierAfter(this.listing, byId('tier').value, this.given, this.givenByPress);
+  }
+
+  /** A tier as the server lists it, or null. */
+  #listed(name) {
+    return this.listing.tiers.find((tier) => tier.name === name) ?? null;
+  }
+
+  /** Goes on with the model that learnt what is given now. */
+  #follow(before) {
+    if (this.given === before) return;
+    const tier = tierAfter(this.listing, byId('tier').value, before, this.given);
+    offerTiers(this.listing, this.given);
+    byId('tier').value = tier;
+    this.ladder.setGiven(this.given);
+  }
+
   #switchTo(tier) {
     byId('tier').value = tier;
     this.effects.forget();
@@ -175,7 +207,8 @@ class Page {
   }
 
   #advice(tier, budgetMs) {
-    return adviseTier(this.listing, { tier, method: this.session.ready?.method ?? null, budgetMs, isContact: this.solves });
+    const { ready } = this.mode === 'hand' ? this.hand.hand ?? {} : this.session;
+    return adviseTier(this.listing, { tier, method: ready?.method ?? null, budgetMs, given: this.given });
   }
 
   /** The session of the hand has terms: model and budget are those of all its fingers. */
@@ -205,12 +238,14 @@ class Page {
     notify('');
   }
 
-  /** Says plainly where the budget cannot be met, and offers what comes nearest. */
+  /** Says plainly where the model learnt something else and where the budget cannot be met, and offers what comes nearest. */
   #noteBudget(ready) {
     const note = byId('budget-note');
     note.replaceChildren();
     if (ready.method && byId('method').value === '') note.append(`Contact: ${nameOfMethod(ready.method)}. `);
     for (const { question } of ready.warnings ?? []) note.append(`The service asks: ${question}. `);
+    const tier = this.#listed(ready.tier);
+    if (tier && !suits(tier, this.given)) note.append(`${nameOfTier(tier.name)}: ${notLearnt(this.given)}. `);
     if (ready.meets_budget !== false) return;
     const budgetMs = ready.budget_us / 1000;
     const advice = this.#advice(ready.tier, budgetMs);
@@ -525,7 +560,7 @@ class Page {
         return;
       }
       const origin = new URL('.', document.baseURI).href.replace(/\/$/, '');
-      copy(pythonOf({ origin, terms: { ...this.#terms(), ...this.contact.terms(this.contact.method) }, pose: this.session.poseFrame.values }), 'Program');
+      copy(pythonOf({ origin, terms: { ...this.#terms(), tier: this.tierOfPress || null, ...this.contact.terms(this.contact.method) }, pose: this.session.poseFrame.values }), 'Program');
     });
     byId('save-csv').addEventListener('click', () => save('papilla.csv', 'text/csv', this.timeline.csv()));
     byId('save-npy').addEventListener('click', () => {
@@ -538,9 +573,9 @@ class Page {
     });
   }
 
-  /** What a link holds. */
+  /** What a link holds; it leads to a press, or to a hand. */
   get state() {
-    return { mode: this.mode === 'hand' ? 'hand' : '', ...this.control.state, tier: byId('tier').value, budget: byId('budget').value, method: byId('method').value, with: byId('with').value || 'none', friction: byId('friction').value, effects: [...this.effects.on].join(' ') };
+    return { mode: this.mode === 'hand' ? 'hand' : '', ...this.control.state, tier: this.tierOfPress || BY_BUDGET, budget: byId('budget').value, method: byId('method').value, with: byId('with').value || 'none', friction: byId('friction').value, effects: [...this.effects.on].join(' ') };
   }
 
   /** Takes what the link says. */
@@ -548,9 +583,10 @@ class Page {
     const state = stateOf(location.hash);
     const choose = (id, value) => { if (value && [...byId(id).options].some((option) => option.value === value)) byId(id).value = value; };
     this.control.state = state;
+    byId('tier').value = state.tier === BY_BUDGET ? '' : defaultFor(this.listing, this.given);
     for (const name of ['tier', 'budget', 'method']) choose(name, state[name]);
     if (this.contact) this.contact.method = byId('method').value;
-    const served = this.listing.tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form');
+    const served = suiting(this.listing.tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form'), this.given);
     const fastest = served.reduce((a, b) => (a && a.predicted_latency_us <= b.predicted_latency_us ? a : b), null);
     if (state.with === 'none') byId('with').value = '';
     else choose('with', state.with ?? (fastest && served.length > 1 ? `tier:${fastest.name}` : ''));
@@ -560,8 +596,10 @@ class Page {
   }
 
   #setMode(mode) {
+    const before = this.given;
     this.mode = mode;
     document.body.dataset.mode = mode;
+    this.#follow(before);
     this.hand?.toggle(mode === 'hand');
     // What an effect brings is of one finger.
     byId('effects-list').inert = mode === 'hand';

@@ -1,13 +1,16 @@
 // Plain names for what files and protocol call otherwise, each with a sentence that explains it.
 
+import { suits } from './tiers.mjs';
+
 /** Sets of simulations that models are judged on (models/ladder.json). */
 const SETS = {
   reference: ['finest mesh', 'the only set that finite elements on coarser meshes were held against'],
   'reference-anew': ['finest mesh, new poses', 'solved when everything was decided'],
-  'heldout-presses': ['new presses, known shapes', 'the table of the README is of these, and the service chooses by them'],
+  'heldout-presses': ['new presses, known shapes', 'for maps of pressure the service chooses by these'],
   'heldout-shapes': ['shapes never trained on', ''],
   pressed: ['hard presses', 'a plate to 7 N, a key, gratings, Braille'],
   s1: ['a flat plate', 'as in the paper of the published U-Net'],
+  poses: ['from poses', 'for poses the service chooses by these; what contact takes comes on top of the times shown'],
   cards: ['the models’ own cards', ''],
 };
 
@@ -26,11 +29,30 @@ const TIERS = {
   's1-base16': ['published U-Net', 'The network of the paper, trained on a flat plate alone; for comparison.'],
   's1-base16-relative': ['published U-Net, scaled', 'The network of the paper on relative pressure; for comparison.'],
   'half-space': ['half-space', 'A closed form for a flat elastic block: no network, and rough on a finger.'],
-  'large-maps': ['large-maps', 'Trained only on pressure from finite elements: best where that is known.'],
+  'nano-maps': ['nano for maps', 'For sessions that give maps of pressure.'],
+  'small-maps': ['small for maps', 'For sessions that give maps of pressure.'],
+  'large-maps': ['large for maps', 'For sessions that give maps of pressure.'],
 };
 
+/** What a tier says that did not learn what is given. */
+const NOT_LEARNT = {
+  poses: 'it learnt the pressure of finite elements; here contact finds the pressure from poses',
+  pressure: 'it learnt the pressure that contact finds from poses; here maps of pressure are given',
+};
+/** Heads of the choices that did not learn it. */
+const OTHERS = { poses: 'learnt maps of pressure', pressure: 'learnt the pressure of contact' };
+
 export const nameOfTier = (tier) => TIERS[tier]?.[0] ?? tier;
-export const aboutTier = (tier) => TIERS[tier]?.[1] ?? '';
+const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}.`;
+
+/** A sentence about a tier of the listing; with what is `given`, also that the tier did not learn it. */
+export function aboutTier(name, tier, given) {
+  const own = TIERS[name]?.[1] ?? '';
+  return tier && !suits(tier, given) ? `${own} ${sentence(NOT_LEARNT[given])}`.trim() : own;
+}
+
+export const notLearnt = (given) => NOT_LEARNT[given];
+export const nameOfOthers = (given) => OTHERS[given];
 
 /** Contact methods (docs/concepts/contact.md). */
 const METHODS = {

@@ -34,6 +34,8 @@ const { hashOf, npyOf, pythonOf, stateOf } = await load('share.mjs');
 const { rowsNear } = await load('spikes.mjs');
 const { verdictOf } = await load('hard.mjs');
 const { adviseTier, logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
+const { defaultFor, errorFrom, setFor, suiting, suits, tierAfter, tierFor } = await load('tiers.mjs');
+const { aboutTier, nameOfSet, nameOfTier } = await load('words.mjs');
 
 test('a request frame has the documented bytes', () => {
   const frame = RequestFrame.map();
@@ -270,12 +272,73 @@ test('where frames are late the most accurate network within the budget is advis
   const method = (name, ms, error) => ({ name, contact_us: 1000 * ms, errors: [{ pressure_relative_l2: { median: error } }] });
   const tiers = [tier('form', 0.2, 0.5, { kind: 'closed_form' }), tier('nano', 1, 0.14), tier('small', 4, 0.12), tier('unet', 3, 0.1, { named_only: 'outdone' }), tier('large', 20, 0.1)];
   const methods = [method('springs', 0.1, 0.4), method('pixels', 8, 0.08)];
-  const of = (budgetMs, isContact) => adviseTier({ tiers, methods }, { tier: 'large', method: 'pixels', budgetMs, isContact });
-  assert.deepEqual([of(11, false).tier, of(2, false).tier], ['small', 'nano']);
-  assert.match(of(0.5, false).text, /^no model is that fast here; the fastest, nano, takes some 1 ms$/);
-  assert.deepEqual([of(13, true).tier, of(13, true).method], ['small', 'pixels']);
-  assert.deepEqual([of(5, true).tier, of(5, true).method], ['small', 'springs']);
-  assert.match(of(1, true).text, /the fastest, nano with contact springs, takes some 1.1 ms$/);
+  const of = (budgetMs, given) => adviseTier({ tiers, methods }, { tier: 'large', method: 'pixels', budgetMs, given });
+  assert.deepEqual([of(11, 'pressure').tier, of(2, 'pressure').tier], ['small', 'nano']);
+  assert.match(of(0.5, 'pressure').text, /^no model is that fast here; the fastest, nano, takes some 1 ms$/);
+  assert.deepEqual([of(13, 'poses').tier, of(13, 'poses').method], ['small', 'pixels']);
+  assert.deepEqual([of(5, 'poses').tier, of(5, 'poses').method], ['small', 'springs']);
+  assert.match(of(1, 'poses').text, /the fastest, nano with contact springs, takes some 1.1 ms$/);
+});
+
+/** Tiers that learnt one pressure each, a tier that learnt both, and a closed form; errors of maps, then of poses. */
+function twoWorlds() {
+  const tier = (name, learnt, ms, errors, kind = 'network') => ({
+    name, learnt, kind, named_only: null, predicted_latency_us: 1000 * ms, relative_l2_median: errors[0], relative_l2_median_from_poses: errors[1],
+  });
+  return {
+    default: 'small', default_for_pressure: 'small-maps', judged_on: 'heldout-presses', methods: [{ name: 'pixels', contact_us: 8000 }],
+    tiers: [
+      tier('form', 'fe', 0.2, [0.5, 0.5], 'closed_form'), tier('pico', 'both', 1, [0.17, 0.16]), tier('small', 'contact', 4, [0.15, 0.09]), tier('large', 'contact', 20, [0.14, 0.08]),
+      tier('small-maps', 'fe', 4, [0.08, 0.14]), tier('large-maps', 'fe', 40, [0.06, 0.13]), tier('mine', 'contact', 3, [0.2, 0.1]),
+    ],
+  };
+}
+
+test('a network is advised for what is given, and judged by its error from that', () => {
+  const data = twoWorlds();
+  const of = (budgetMs, given, tier) => adviseTier(data, { tier, method: given === 'poses' ? 'pixels' : null, budgetMs, given });
+  assert.equal(of(30, 'pressure', 'large-maps').tier, 'small-maps', 'of maps small-maps has the least error within 30 ms');
+  assert.equal(of(30, 'poses', 'small').tier, 'large', 'of poses large has');
+  assert.equal(of(15, 'poses', 'large').tier, 'small');
+  // What nobody has measured from poses is judged by its error from maps.
+  for (const tier of data.tiers) tier.relative_l2_median_from_poses = null;
+  assert.equal(of(100, 'poses', 'small').tier, 'large');
+  // Where no network learnt what is given, those that there are.
+  data.tiers = data.tiers.filter(({ learnt }) => learnt === 'fe');
+  assert.equal(of(100, 'poses', '').tier, 'large-maps');
+});
+
+test('another input takes the sibling that learnt it, a default a default, and goes back likewise', () => {
+  const data = twoWorlds();
+  const to = (name, before, now) => tierAfter(data, name, before, now);
+  assert.deepEqual(['poses', 'pressure'].map((given) => defaultFor(data, given)), ['small', 'small-maps']);
+  for (const [press, replay] of [['small', 'small-maps'], ['large', 'large-maps'], ['pico', 'pico'], ['form', 'form'], ['mine', 'mine'], ['', '']]) {
+    assert.equal(to(press, 'poses', 'pressure'), replay);
+    assert.equal(to(replay, 'pressure', 'poses'), press);
+  }
+  // Who names a network of the other kind in the same mode keeps it.
+  assert.equal(to('small-maps', 'poses', 'poses'), 'small-maps');
+  data.default = 'large';
+  assert.deepEqual([to('large', 'poses', 'pressure'), to('small-maps', 'pressure', 'poses')], ['small-maps', 'large'], 'defaults need not be siblings');
+  assert.deepEqual([tierFor(data, 'small', 'pressure'), tierFor(data, 'none', 'pressure')], ['small-maps', 'none']);
+  assert.deepEqual(suiting(data.tiers, 'pressure').map(({ name }) => name), ['form', 'pico', 'small-maps', 'large-maps']);
+  assert.deepEqual(suiting(data.tiers, 'poses').map(({ name }) => name), ['form', 'pico', 'small', 'large', 'mine']);
+});
+
+test('errors, sets and words are those of what is given', () => {
+  const data = twoWorlds();
+  const [, pico, small, , maps] = data.tiers;
+  assert.deepEqual([errorFrom(small, 'poses'), errorFrom(small, 'pressure'), errorFrom({ ...small, relative_l2_median_from_poses: null }, 'poses')], [0.09, 0.15, 0.15]);
+  const sets = ['heldout-presses', 'reference', 'poses'];
+  assert.deepEqual(['poses', 'pressure'].map((given) => setFor(data, sets, given)), ['poses', 'heldout-presses']);
+  assert.equal(setFor(data, ['reference'], 'poses'), 'reference');
+  assert.equal(setFor({ ...data, tiers: [{ ...small, relative_l2_median_from_poses: null }] }, sets, 'poses'), 'heldout-presses', 'the service does not judge by it');
+  assert.deepEqual(['poses', 'nowhere'].map(nameOfSet), ['from poses', 'nowhere']);
+  assert.deepEqual(['nano-maps', 'small-maps', 'large-maps', 'small'].map(nameOfTier), ['nano for maps', 'small for maps', 'large for maps', 'small']);
+  assert.deepEqual([suits(small, 'pressure'), suits(small, 'poses'), suits(maps, 'poses'), suits(pico, 'poses'), suits(pico, 'pressure')], [false, true, false, true, true]);
+  assert.match(aboutTier('small', small, 'pressure'), /^It learnt the pressure that contact finds from poses; here maps/);
+  assert.match(aboutTier('small-maps', maps, 'poses'), /^For sessions that give maps of pressure\. It learnt the pressure of finite elements; here contact/);
+  assert.deepEqual([aboutTier('small', small, 'poses'), aboutTier('small-maps')], ['', 'For sessions that give maps of pressure.']);
 });
 
 /** What /v1/tiers answers, in small. */
