@@ -8,6 +8,9 @@ import { BASE, largest, launch, placeOfPeak } from './browser.mjs';
 const PATIENCE_MS = 90000;
 let browser;
 let page;
+let listing;
+/** What the page begins with: the model, the set of the ladder, the second model. */
+let begun;
 const complaints = [];
 
 before(async () => {
@@ -17,6 +20,9 @@ before(async () => {
   page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
   page.on('pageerror', (error) => complaints.push(String(error)));
   await page.goto(BASE, { timeout: PATIENCE_MS });
+  listing = await (await fetch(new URL('v1/tiers', BASE))).json();
+  await until(() => globalThis.papilla?.session.ready);
+  begun = await chosen();
   await page.selectOption('#tier', 'nano');
   await page.selectOption('#budget', '500000');
 });
@@ -26,6 +32,8 @@ after(async () => browser?.close());
 const until = (condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });
 const chooseRadio = (name, value) => page.check(`input[name=${name}][value=${value}]`, { force: true });
 const keep = async (name) => { if (process.env.PAPILLA_SHOTS) await page.screenshot({ path: `${process.env.PAPILLA_SHOTS}/${name}.png`, fullPage: true }); };
+
+const chosen = async () => Promise.all(['tier', 'ladder-set', 'with'].map((id) => page.locator(`#${id}`).inputValue()));
 
 /** Waits until the indenter is announced and has arrived, and a frame sent after that is answered. */
 async function settled() {
@@ -183,6 +191,57 @@ test('replay sends maps as ever, and a press is solved again after it', async ()
   await until(() => globalThis.papilla.session.ready?.method);
   await settled();
   assert.ok((await felt()).forceN > 0);
+});
+
+test('each mode has the networks that learnt what it gives, and goes on with the sibling', async () => {
+  const others = async () => page.locator('#tier optgroup option').evaluateAll((all) => all.map((option) => option.value));
+  const learnt = (what) => listing.tiers.filter((tier) => tier.kind === 'network' && tier.learnt === what).map(({ name }) => name);
+  const answers = (tier) => until((name) => globalThis.papilla.session.ready?.tier === name && globalThis.papilla.answered.tier === name, tier);
+  const fastest = listing.tiers.filter(({ kind, learnt: of, named_only: only }) => kind === 'network' && of !== 'fe' && !only)
+    .reduce((a, b) => (b.predicted_latency_us < a.predicted_latency_us ? b : a)).name;
+  assert.deepEqual(begun, [listing.default, 'poses', `tier:${fastest}`]);
+  assert.deepEqual(await others(), learnt('fe'));
+  const label = (name) => page.locator(`#tier option[value=${name}]`).textContent();
+  const percent = (value) => `${(100 * value).toFixed(100 * value < 10 ? 1 : 0)} % off`;
+  const nano = listing.tiers.find(({ name }) => name === 'nano');
+  assert.ok((await label('nano')).includes(percent(nano.relative_l2_median_from_poses)), await label('nano'));
+  await chooseRadio('mode', 'replay');
+  await answers('nano-maps');
+  assert.deepEqual((await chosen()).slice(0, 2), ['nano-maps', listing.judged_on]);
+  assert.deepEqual(await others(), learnt('contact'));
+  assert.ok((await label('nano')).includes(percent(nano.relative_l2_median)), await label('nano'));
+  // A link and a program are of a press, whatever is replayed.
+  assert.deepEqual(await page.evaluate(() => [globalThis.papilla.state.tier, globalThis.papilla.tierOfPress]), ['nano', 'nano']);
+  // What did not learn it can be had, and says so.
+  await page.selectOption('#tier', 'nano');
+  await answers('nano');
+  await until(() => /nano: it learnt the pressure that contact finds from poses; here maps/.test(document.getElementById('budget-note').textContent));
+  await page.selectOption('#tier', listing.default_for_pressure);
+  await chooseRadio('mode', 'press');
+  await answers(listing.default);
+  await until(() => !/learnt/.test(document.getElementById('budget-note').textContent));
+  assert.deepEqual((await chosen()).slice(0, 2), [listing.default, 'poses']);
+  await page.selectOption('#tier', '');
+  await chooseRadio('mode', 'replay');
+  await until(() => globalThis.papilla.session.ready && !globalThis.papilla.session.ready.method);
+  assert.deepEqual(await page.evaluate(() => [document.getElementById('tier').value, globalThis.papilla.state.tier]), ['', 'by-budget']);
+  assert.ok(!learnt('contact').includes(await page.evaluate(() => globalThis.papilla.session.ready.tier)), 'the service chooses by what is given');
+  await chooseRadio('mode', 'press');
+  await page.selectOption('#tier', 'nano');
+  await answers('nano');
+  await settled();
+});
+
+test('a link that names no model leads to the default, and one by budget to the budget', async () => {
+  const context = await browser.newContext();
+  for (const [hash, tier] of [['', listing.default], ['#tier=by-budget', ''], ['#tier=small-maps', 'small-maps'], ['#tier=nowhere', listing.default]]) {
+    const other = await context.newPage();
+    await other.goto(`${BASE}${hash}`, { timeout: PATIENCE_MS });
+    await other.waitForFunction(() => globalThis.papilla?.session.ready, undefined, { timeout: PATIENCE_MS });
+    assert.equal(await other.locator('#tier').inputValue(), tier, hash);
+    await other.close();
+  }
+  await context.close();
 });
 
 test('a second model answers the same contact, and the difference is of that pair', async () => {
