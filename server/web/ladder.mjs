@@ -93,7 +93,7 @@ export function placeName(taken, x, y, width, right) {
   return found;
 }
 
-const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
+const oneDigit = (value) => value.toFixed(value < 9.95 ? 1 : 0);
 const least = (among, key) => among.reduce((a, b) => (a === undefined || b[key] < a[key] ? b : a), undefined);
 
 /**
