@@ -243,9 +243,11 @@ class Page {
     const note = byId('budget-note');
     note.replaceChildren();
     if (ready.method && byId('method').value === '') note.append(`Contact: ${nameOfMethod(ready.method)}. `);
-    for (const { question } of ready.warnings ?? []) note.append(`The service asks: ${question}. `);
+    // The page says in its own words what the tier did not learn.
     const tier = this.#listed(ready.tier);
-    if (tier && !suits(tier, this.given)) note.append(`${nameOfTier(tier.name)}: ${notLearnt(this.given)}. `);
+    const isOther = tier && !suits(tier, this.given);
+    if (isOther) note.append(`${nameOfTier(tier.name)}: ${notLearnt(this.given)}. `);
+    for (const { member, question } of ready.warnings ?? []) if (!isOther || member !== 'tier') note.append(`The service asks: ${question}. `);
     if (ready.meets_budget !== false) return;
     const budgetMs = ready.budget_us / 1000;
     const advice = this.#advice(ready.tier, budgetMs);
