@@ -21,7 +21,9 @@ export const nameOfSet = (set) => SETS[set]?.[0] ?? set;
 export function aboutSet(sets, name) {
   const set = sets?.find((one) => one.name === name);
   const more = SETS[name]?.[1];
-  const count = set ? `${set.samples} simulations: ${set.about}` : '';
+  // Other sets are named there as files call them.
+  const about = set?.about.replace(/`([^`]+)`/g, (_, other) => `“${nameOfSet(other)}”`);
+  const count = set ? `${set.samples} simulations: ${about}` : '';
   return [count, more].filter(Boolean).join('; ');
 }
 

@@ -35,7 +35,7 @@ const { rowsNear } = await load('spikes.mjs');
 const { verdictOf } = await load('hard.mjs');
 const { adviseTier, logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
 const { defaultFor, errorFrom, setFor, suiting, suits, tierAfter, tierFor } = await load('tiers.mjs');
-const { aboutTier, nameOfSet, nameOfTier } = await load('words.mjs');
+const { aboutSet, aboutTier, nameOfSet, nameOfTier } = await load('words.mjs');
 
 test('a request frame has the documented bytes', () => {
   const frame = RequestFrame.map();
@@ -334,6 +334,8 @@ test('errors, sets and words are those of what is given', () => {
   assert.equal(setFor(data, ['reference'], 'poses'), 'reference');
   assert.equal(setFor({ ...data, tiers: [{ ...small, relative_l2_median_from_poses: null }] }, sets, 'poses'), 'heldout-presses', 'the service does not judge by it');
   assert.deepEqual(['poses', 'nowhere'].map(nameOfSet), ['from poses', 'nowhere']);
+  const about = aboutSet([{ name: 'poses', samples: 86, about: 'the states of `heldout-presses`, pressed by contact' }], 'poses');
+  assert.match(about, /^86 simulations: the states of “new presses, known shapes”, pressed by contact; for poses the service chooses by these/);
   assert.deepEqual(['nano-maps', 'small-maps', 'large-maps', 'small'].map(nameOfTier), ['nano for maps', 'small for maps', 'large for maps', 'small']);
   assert.deepEqual([suits(small, 'pressure'), suits(small, 'poses'), suits(maps, 'poses'), suits(pico, 'poses'), suits(pico, 'pressure')], [false, true, false, true, true]);
   assert.match(aboutTier('small', small, 'pressure'), /^It learnt the pressure that contact finds from poses; here maps/);

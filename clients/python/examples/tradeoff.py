@@ -1,8 +1,8 @@
 """Accuracy against time on this machine: every model of the service, its errors and its time here.
 
 The errors are those that the service lists, against finite elements: one from maps of pressure, and one from poses,
-whose pressure the service finds. A model errs least from what it learnt. The times are of the networks alone, measured
-now, each the least of several runs. Writes tradeoff.png (matplotlib).
+whose pressure the service finds. Which of the two a model learnt is printed beside them. The times are of the networks
+alone, measured now, each the least of several runs. Writes tradeoff.png (matplotlib).
 """
 
 import os
