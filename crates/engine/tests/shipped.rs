@@ -37,6 +37,23 @@ fn masks() -> [Vec<bool>; 2] {
     Patch::ALL.map(|patch| Raster::new(&atlas, patch).mask().to_vec())
 }
 
+/// In tract's own way a network on maps takes several times as long, which no answer shows.
+#[test]
+fn every_network_on_maps_is_evaluated_by_rows() {
+    let names = Index::from_json(&text("index.json")).unwrap().models;
+    let mut found = 0;
+    for name in names {
+        let card = Card::from_json(&text(&format!("{name}.json"))).unwrap();
+        let model = load_with(Backend::Tract, &read(&format!("{name}.onnx")), Some(&card)).unwrap();
+        let (info, members) = (model.info(), card.training.get("mean_of").is_some());
+        if info.network["kind"] == "map_net" || members {
+            assert!(info.backend.ends_with("by rows"), "{name}: {}", info.backend);
+            found += 1;
+        }
+    }
+    assert!(found >= 6, "{found} networks on maps");
+}
+
 /// The laws of errors are of the models and the contact model that ship.
 #[test]
 fn errors_are_stated_of_what_ships() {
