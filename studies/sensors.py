@@ -28,7 +28,7 @@ from papilla_trainer.dataset import Dataset  # noqa: E402
 
 PITCHES_MM = (1.0, 2.0, 4.0)
 NOISES = (0.0, 0.02, 0.05)
-TIER = "small"
+TIER = "small-maps"
 REPORT = ROOT / "studies/reports/sensors.md"
 PICTURE = ROOT / "studies/reports/pictures/sensors.png"
 TABLE = ROOT / "clients/python/papilla/sensors/accuracy.json"

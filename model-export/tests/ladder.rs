@@ -63,6 +63,7 @@ fn every_rung_has_the_known_errors() {
         ("reference-anew", 0),
         ("pressed", 0),
         ("s1", 3),
+        ("poses", 0),
     ];
     assert_eq!(samples, due);
     assert!(ladder.sets[0].about.contains("no dataset 'broad-graded'"), "{:?}", ladder.sets[0]);

@@ -101,6 +101,7 @@ pub struct Server {
     address: SocketAddr,
     tiers: Vec<String>,
     default_tier: String,
+    default_tier_for_pressure: String,
     threads: usize,
     real_time: Option<RealTime>,
     drain: EndOnDrop,
@@ -224,6 +225,7 @@ impl Starting {
             address: self.address,
             tiers: opened.tiers,
             default_tier: opened.default_tier,
+            default_tier_for_pressure: opened.default_tier_for_pressure,
             threads: self.threads,
             real_time: opened.real_time,
             drain: self.drain,
@@ -249,10 +251,16 @@ impl Server {
         &self.tiers
     }
 
-    /// Name of the tier taken for clients that name neither tier nor budget.
+    /// Name of the tier taken for clients that give poses or gaps and name neither tier nor budget.
     #[must_use]
     pub fn default_tier(&self) -> &str {
         &self.default_tier
+    }
+
+    /// The same for clients that give pressure.
+    #[must_use]
+    pub fn default_tier_for_pressure(&self) -> &str {
+        &self.default_tier_for_pressure
     }
 
     /// Number of inference threads.

@@ -148,6 +148,7 @@ fn announce(server: &Server, config: &Config) -> io::Result<()> {
             "port": server.address().port(),
             "tiers": server.tiers(),
             "default_tier": server.default_tier(),
+            "default_tier_for_pressure": server.default_tier_for_pressure(),
             "threads": server.threads(),
             "real_time": server.real_time(),
         });
@@ -155,21 +156,21 @@ fn announce(server: &Server, config: &Config) -> io::Result<()> {
     } else {
         let threads = server.threads();
         let plural = if threads == 1 { "" } else { "s" };
-        let others: Vec<&str> = server
-            .tiers()
-            .iter()
-            .map(String::as_str)
-            .filter(|&tier| tier != server.default_tier())
-            .collect();
+        let defaults = [server.default_tier(), server.default_tier_for_pressure()];
+        let serves = match defaults {
+            [tier, for_pressure] if tier == for_pressure => format!("tier {tier}"),
+            [tier, for_pressure] => format!("tiers {tier} and, for pressure, {for_pressure}"),
+        };
+        let names = server.tiers().iter().map(String::as_str);
+        let others: Vec<&str> = names.filter(|name| !defaults.contains(name)).collect();
         let by_name = match &others[..] {
             [] => String::new(),
             others => format!(", and by name {},", others.join(", ")),
         };
         writeln!(
             out,
-            "Papilla {} serves tier {}{by_name} on {threads} thread{plural}.\nOpen {address}",
+            "Papilla {} serves {serves}{by_name} on {threads} thread{plural}.\nOpen {address}",
             env!("CARGO_PKG_VERSION"),
-            server.default_tier(),
         )?;
     }
     out.flush()

@@ -588,10 +588,13 @@ class Page {
     byId('tier').value = state.tier === BY_BUDGET ? '' : defaultFor(this.listing, this.given);
     for (const name of ['tier', 'budget', 'method']) choose(name, state[name]);
     if (this.contact) this.contact.method = byId('method').value;
-    const served = suiting(this.listing.tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form'), this.given);
+    // Beside the press by the chosen tier, the same press by another one.
+    const chosen = byId('tier').value || defaultFor(this.listing, this.given);
+    const served = suiting(this.listing.tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form'), this.given)
+      .filter((tier) => tier.name !== chosen);
     const fastest = served.reduce((a, b) => (a && a.predicted_latency_us <= b.predicted_latency_us ? a : b), null);
     if (state.with === 'none') byId('with').value = '';
-    else choose('with', state.with ?? (fastest && served.length > 1 ? `tier:${fastest.name}` : ''));
+    else choose('with', state.with ?? (fastest ? `tier:${fastest.name}` : ''));
     if (Number(state.friction) > 0) this.#setFriction(Math.min(1, Number(state.friction)));
     for (const name of (state.effects ?? '').split(' ')) this.effects.set(name, true);
     this.spikes.toggle(this.effects.on.has('spikes'));

@@ -57,6 +57,7 @@ pub(crate) struct Opened {
     pub(crate) pool: Pool,
     pub(crate) tiers: Vec<String>,
     pub(crate) default_tier: String,
+    pub(crate) default_tier_for_pressure: String,
     pub(crate) real_time: Option<RealTime>,
 }
 
@@ -96,7 +97,9 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     thread::Builder::new().name("start".to_owned()).spawn(work).map_err(StartError::Thread)?;
     let (catalogue, pool) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
-    let default_tier = catalogue.tiers[catalogue.default].name.clone();
+    let [default_tier, default_tier_for_pressure] =
+        [catalogue.default, catalogue.default_for_pressure]
+            .map(|place| catalogue.tiers[place].name.clone());
     let real_time = priorities.report(&metrics);
     let step_back = move || priorities.enter(Role::Behind);
     let desk = Desk::start(desk_threads(), step_back).map_err(StartError::Thread)?;
@@ -119,7 +122,7 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
         tokio::spawn(remeasure::until_drain(Arc::clone(&app)));
     }
     tokio::spawn(load::until_drain(Arc::clone(&app), config.thread_count()));
-    Ok(Opened { app, pool, tiers, default_tier, real_time })
+    Ok(Opened { app, pool, tiers, default_tier, default_tier_for_pressure, real_time })
 }
 
 /// Threads for hellos: half of the processors, within bounds.
