@@ -4,7 +4,7 @@
 //! this engine, on simulations that no training saw.
 
 use crate::{EngineError, MODEL_FORMAT, ModelInfo};
-use papilla_proto::{InputStatistics, json};
+use papilla_proto::{InputStatistics, Warning, contact::Input, json};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -81,6 +81,32 @@ impl Learnt {
     pub fn knows_fe(self) -> bool {
         self != Self::Contact
     }
+
+    /// Whether it learnt such pressure as sessions with this input render.
+    #[must_use]
+    pub fn suits(self, input: Input) -> bool {
+        match input {
+            Input::Pressure => self.knows_fe(),
+            Input::Gaps | Input::Objects => self.knows_contact(),
+        }
+    }
+}
+
+/// The warning about a model that a hello names and that did not learn such pressure as it will get,
+/// where the default did.
+#[must_use]
+pub fn unlearnt(input: Input, named: &str, default: &str) -> Warning {
+    let (learnt, gets) = match input {
+        Input::Pressure => ("that contact finds from poses", "pressure that the client sends"),
+        Input::Gaps | Input::Objects => {
+            ("of simulations", "the pressure that contact finds from poses and gaps")
+        }
+    };
+    let question = format!(
+        "tier {named} learnt the pressure {learnt}; from {gets} its SED is further off than that of \
+         {default}, which a hello without 'tier' gets"
+    );
+    Warning { member: "tier".to_owned(), value: None, question }
 }
 
 /// Accuracy over the samples of a split. All but SSIM are errors, relative, without unit.

@@ -5,8 +5,14 @@ use std::{
     sync::Arc,
 };
 
-use papilla_engine::{Card, card::Index, error_law::ErrorLaws};
+use papilla_engine::{
+    Card,
+    card::{Index, unlearnt},
+    error_law::ErrorLaws,
+    ladder::Kind,
+};
 use papilla_proto::{
+    Warning,
     atlas::{AtlasError, Patch, Raster},
     contact::Input,
 };
@@ -25,6 +31,8 @@ pub struct Model {
     pub(crate) shared: effects::Shared,
     network: Arc<Network>,
     for_pressure: Arc<Network>,
+    /// The cards of the folder's defaults, for poses and for pressure, as far as they are there.
+    defaults: [Option<Card>; 2],
     /// By what the errors of answers are told; none: the folder has no `errors.json`.
     pub(crate) error_laws: Option<ErrorLaws>,
 }
@@ -37,10 +45,20 @@ pub struct Network {
     pub card: Card,
 }
 
+/// Whether a network learnt such pressure as frames with this input give. What is no network on maps
+/// learnt none and takes any.
+fn suits(card: &Card, input: Input) -> bool {
+    Kind::of_network(&card.network) != Kind::Network || card.learnt().suits(input)
+}
+
+fn read_card(folder: &Path, name: &str) -> Result<Card, LoadError> {
+    let (file, json) = read_text(folder.join(format!("{name}.json")))?;
+    Card::from_json(&json).map_err(|source| LoadError::Engine { file, source })
+}
+
 impl Network {
     fn read(folder: &Path, name: &str) -> Result<Self, LoadError> {
-        let (file, json) = read_text(folder.join(format!("{name}.json")))?;
-        let card = Card::from_json(&json).map_err(|source| LoadError::Engine { file, source })?;
+        let card = read_card(folder, name)?;
         let (file, onnx) = read(folder.join(format!("{name}.onnx")))?;
         let model = papilla_engine::load(&onnx, Some(&card))
             .map_err(|source| LoadError::Engine { file, source })?;
@@ -83,12 +101,14 @@ impl Model {
         } else {
             Arc::new(Network::read(folder, for_pressure)?)
         };
+        let defaults = [&index.default, index.default_for_pressure()]
+            .map(|default| read_card(folder, default).ok());
         let hash = &network.model.info().atlas_hash;
         let bundle = Arc::new(Bundle::read(folder, contact, Some(hash))?);
         let interface = Raster::new(&bundle.atlas, Patch::Interface);
         let error_laws = read_error_laws(folder.join("errors.json"), hash)?;
         let shared = effects::Shared::default();
-        Ok(Self { bundle, interface, shared, network, for_pressure, error_laws })
+        Ok(Self { bundle, interface, shared, network, for_pressure, defaults, error_laws })
     }
 
     /// The network for frames that hold this.
@@ -98,6 +118,18 @@ impl Model {
             Input::Pressure => &self.for_pressure,
             Input::Gaps | Input::Objects => &self.network,
         }
+    }
+
+    /// The warning about a network that did not learn what frames give, where the default did.
+    pub(crate) fn unlearnt(&self, network: &Network, input: Input) -> Option<Warning> {
+        let [for_poses, for_pressure] = &self.defaults;
+        let default = match input {
+            Input::Pressure => for_pressure,
+            Input::Gaps | Input::Objects => for_poses,
+        };
+        let default = default.as_ref()?;
+        let is_worse = !suits(&network.card, input) && suits(default, input);
+        is_worse.then(|| unlearnt(input, &network.card.name, &default.name))
     }
 
     /// The networks that were loaded, each once.

@@ -200,6 +200,8 @@ impl Session {
         let method = hand.method();
         let errors = model.bundle.contact_errors.as_ref();
         let effects = self.effects.first();
+        let unlearnt = model.unlearnt(of, self.hello.input.unwrap_or_default());
+        let unlearnt = unlearnt.filter(|_| self.shows_sed());
         Ready {
             version: PROTOCOL_VERSION.into(),
             session: 0,
@@ -230,7 +232,7 @@ impl Session {
             finger_terms: None,
             method,
             expected_error: errors.zip(method).and_then(|(errors, of)| errors.of(of)).cloned(),
-            warnings: hand.warnings().to_vec(),
+            warnings: hand.warnings().iter().cloned().chain(unlearnt).collect(),
         }
     }
 

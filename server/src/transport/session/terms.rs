@@ -6,6 +6,7 @@ use std::sync::{
 };
 
 use papilla_codec::{Output, scale_of};
+use papilla_engine::card;
 use papilla_proto::{
     ErrorCode, FingerTerms, HEADER_LEN, Hello, MAP_SIDE_PX, PROTOCOL_VERSION, Problem, Ready,
     Resumption, RuntimeEffect, SampleType, Warning,
@@ -518,16 +519,11 @@ fn unlearnt(given: Given, tier: &Tier, catalogue: &Catalogue) -> Option<Warning>
     if tier.suits(given) || !default.suits(given) {
         return None;
     }
-    let (learnt, gets) = match given {
-        Given::Pressure => ("that contact finds from poses", "pressure that the client sends"),
-        Given::Contact => ("of simulations", "the pressure that contact finds from poses and gaps"),
+    let input = match given {
+        Given::Pressure => Input::Pressure,
+        Given::Contact => Input::Objects,
     };
-    let question = format!(
-        "tier {} learnt the pressure {learnt}; from {gets} its SED is further off than that of \
-         {}, which a hello without 'tier' gets",
-        tier.name, default.name
-    );
-    Some(Warning { member: "tier".to_owned(), value: None, question })
+    Some(card::unlearnt(input, &tier.name, &default.name))
 }
 
 /// The warning about a finger whose network was trained on another finger.
