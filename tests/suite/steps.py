@@ -280,8 +280,10 @@ def full() -> list[Step]:
         Step(
             "page",
             "the page in headless Chromium",
-            "clients/conformance/run --only-serve --no-contact page npm --prefix tests/browser test --silent\n"
-            "clients/conformance/run --only-serve page npm --prefix tests/browser run contact --silent",
+            # On a busy core the drawing alone takes minutes.
+            "run='clients/conformance/run --only-serve --timeout-s 1500'\n"
+            "$run --no-contact page npm --prefix tests/browser test --silent\n"
+            "$run page npm --prefix tests/browser run contact --silent",
             after=("build", "node", "packages"),
             tests_min=38,
         ),
