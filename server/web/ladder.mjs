@@ -2,7 +2,7 @@
 // Times of rungs that this server serves are its own calibration, the others' are those shipped.
 
 import { fetchJson } from './replay.mjs';
-import { errorFrom, setFor, suiting, suits } from './tiers.mjs';
+import { choosable, errorFrom, setFor, suits } from './tiers.mjs';
 import { aboutMethod, aboutSet, aboutTier, nameOfMethod, nameOfOthers, nameOfSet, nameOfTier } from './words.mjs';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -101,7 +101,7 @@ const least = (among, key) => among.reduce((a, b) => (a === undefined || b[key] 
  * contact method where frames are poses.
  */
 function waysOf({ tiers, methods }, given) {
-  const networks = suiting(tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form'), given);
+  const networks = choosable(tiers, given);
   const contacts = given === 'poses' && methods ? methods : [null];
   return networks.flatMap((tier) => contacts.map((method) => ({
     tier: tier.name, error: errorFrom(tier, given), method: method?.name ?? null, ms: (tier.predicted_latency_us + (method?.contact_us ?? 0)) / 1000,

@@ -22,7 +22,7 @@ import { hashOf, npyOf, pictureOf, pythonOf, save, stateOf } from './share.mjs';
 import { SpikeView } from './spikes.mjs';
 import { SureBar } from './sure.mjs';
 import { themeButton } from './theme.mjs';
-import { defaultFor, suiting, suits, tierAfter, tierFor } from './tiers.mjs';
+import { choosable, defaultFor, suits, tierAfter, tierFor } from './tiers.mjs';
 import { Timeline } from './timeline.mjs';
 import { flagsOf, nameOfMethod, nameOfTier, notLearnt } from './words.mjs';
 
@@ -590,8 +590,7 @@ class Page {
     if (this.contact) this.contact.method = byId('method').value;
     // Beside the press by the chosen tier, the same press by another one.
     const chosen = byId('tier').value || defaultFor(this.listing, this.given);
-    const served = suiting(this.listing.tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form'), this.given)
-      .filter((tier) => tier.name !== chosen);
+    const served = choosable(this.listing.tiers, this.given).filter((tier) => tier.name !== chosen);
     const fastest = served.reduce((a, b) => (a && a.predicted_latency_us <= b.predicted_latency_us ? a : b), null);
     if (state.with === 'none') byId('with').value = '';
     else choose('with', state.with ?? (fastest ? `tier:${fastest.name}` : ''));

@@ -13,6 +13,9 @@ export function suiting(tiers, given) {
   return found.length > 0 ? found : tiers;
 }
 
+/** The networks among which to choose for what is given: not what another outdoes, nor what is loaded when it is named, nor a closed form. */
+export const choosable = (tiers, given) => suiting(tiers.filter((tier) => !tier.named_only && tier.kind !== 'closed_form'), given);
+
 /** Median relative L2 error of SED against finite elements, from what is given. */
 export const errorFrom = (tier, given) => (given === 'poses' ? tier.relative_l2_median_from_poses : null) ?? tier.relative_l2_median;
 
