@@ -33,8 +33,9 @@ cargo run --release -p papilla-studies -- spikes
 const SED: &str = "
 ## Pins against strain energy density
 
-A pin of 1 mm radius makes a ramp of 1 mm. Its stress at 0.3 mm is given as SED in 1000 frames: what the finger of
-Papilla makes of a stress, without its mechanics. The truth is the neuron under the pin. PC units take force and not SED.
+A pin of 1 mm radius makes a ramp of 1 mm. The stress that it causes 0.3 mm deep is converted to SED, and given to the
+effect in 1000 frames. So this tests the effect alone, without the mechanics of Papilla's finger. The truth is the same
+neuron under the pin in TouchSim. PC units take force and not SED.
 
 | neuron | spikes under the pin | spikes of SED | first under the pin, ms | first of SED, ms |
 |---|---|---|---|---|

@@ -365,7 +365,7 @@ def terminate_under(kind: str, certificate: str | None, service: subprocess.Pope
 KINDS = """| four clients send | which is |
 |---|---|
 | windows | frames of 4 x 4 pixels |
-| whole maps | frames of 128 x 128 pixels, as the judged session sends them |
+| whole maps | frames of 128 x 128 pixels, as the session of 90 Hz sends them |
 | pings, pongs; the same before the hello | control messages of WebSocket, in an open session or before its first message |
 | hellos of 1 MB | first messages that are too long |
 | pieces of nothing | a message in endless empty parts |
@@ -394,7 +394,7 @@ def markdown(found: dict) -> str:
         "```",
         "",
         *KINDS,
-        f"{time.strftime('%Y-%m-%d')}, {name}, {multiprocessing.cpu_count()} cores, which service, flooding clients and judge share. Times in ms.",
+        f"{time.strftime('%Y-%m-%d')}, {name}, {multiprocessing.cpu_count()} cores, which the service, the flooding clients and the session of 90 Hz share. Times in ms.",
         f"**{sound} of {len(found['rows'])} are sound.**",
         "",
         "| transport | four clients send | taken by the service, MB/s | idle p99 | p50 | p99 | greatest | `/healthz`, greatest | lost | sound |",

@@ -100,7 +100,7 @@ pub const SETS: [Set; 11] = [
     },
     Set {
         folder: "proximal-graded",
-        about: "presses towards the hand",
+        about: "indenters near the end towards the hand",
         group: "hard and deep",
         ..Set::PLAIN
     },

@@ -22,8 +22,8 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
     if let Some(floor) = &ladder.discretisation_error {
         let _ = writeln!(
             text,
-            "The SED of the reference itself errs by about {} (relative L2; {}). Differences between ways that are smaller\n\
-             than this mean nothing.\n",
+            "The SED of the reference itself errs by about {} (relative L2 norm). Differences between ways that are smaller\n\
+             than this mean nothing. How this was estimated: {}.\n",
             percent(floor.sed_relative_l2),
             floor.how
         );

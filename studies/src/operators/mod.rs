@@ -56,16 +56,14 @@ pub fn markdown(profiles: &[Profile], rates: &Rates) -> String {
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "\nMeasured on {}, {RUNS} runs of each network. The core does {:.0} operations a ns and reads, in GB/s, of",
+        "\nMeasured on {}, {RUNS} runs of each network. The core does {:.0} operations a ns. It reads a buffer of this\n\
+         size at this rate:\n\n| buffer, kB | rate, GB/s |\n|---|---|",
         machine(),
         rates.operations_per_s / 1e9
     );
-    let sizes = rates
-        .bytes_per_s
-        .iter()
-        .zip(0..)
-        .map(|(rate, size)| format!("{} kB {:.0}", (LEAST_BYTES << size) >> 10, rate / 1e9));
-    let _ = writeln!(text, "{}.", sizes.collect::<Vec<_>>().join(", "));
+    for (rate, size) in rates.bytes_per_s.iter().zip(0..) {
+        let _ = writeln!(text, "| {} | {:.0} |", (LEAST_BYTES << size) >> 10, rate / 1e9);
+    }
     text.push_str(
         "\n| network | weights and maps, MB | operations, million | bound, us | time, us | times the bound |\n\
          |---|---|---|---|---|---|\n",
