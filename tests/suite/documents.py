@@ -9,7 +9,7 @@ links. Reports (docs/reports, studies/reports) are written by commands: of them 
 looked at. No text of a plot (an .svg of docs or studies) is cut off by the picture's edge. The
 number of words has no limit; --words prints each file's. A word is anything between blanks that
 holds a letter; tables count, fenced code, comments and the targets of links do not.
-Exit code 1 if a rule is broken.
+No line is left over from a merge. Exit code 1 if a rule is broken.
 """
 
 import re
@@ -29,6 +29,8 @@ FENCE = re.compile(r"^\s*(```+|~~~+)")
 LINK = re.compile(r"\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)")
 # Mean width of a letter over its height.
 LETTER = 0.5
+# Marks of a merge, also shortened ones. A heading is never underlined here.
+MERGE = re.compile(r"(<{3,}|={3,}|>{3,}|\|{7})( |$)")
 OUTSIDE = re.compile(r"^[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 
 
@@ -93,6 +95,13 @@ def long_lines(text: str) -> Iterator[str]:
             yield f"{number}: {len(shown)} columns, {LINE_MAX} are the most"
 
 
+def merge_lines(text: str) -> Iterator[str]:
+    """A line for each line outside of code that a merge has left behind."""
+    for number, line in prose(text):
+        if MERGE.match(line):
+            yield f"{number}: left over from a merge: {line}"
+
+
 def words(text: str) -> int:
     """Words outside of fenced code, comments and the targets of links."""
     shown = "\n".join(line for _, line in prose(text))
@@ -125,7 +134,7 @@ def main() -> int:
         text = path.read_text()
         if HEADS.match(name):
             continue
-        rules = list(broken_links(path, text))
+        rules = [*broken_links(path, text), *merge_lines(text)]
         if not GENERATED.match(name):
             rules += long_lines(text)
             counts[name] = words(text)

@@ -43,6 +43,12 @@ class Lines(unittest.TestCase):
         self.assertEqual(documents.words(text), 4)
 
 
+class Merges(unittest.TestCase):
+    def test_what_a_merge_left_is_named_and_code_is_left_alone(self) -> None:
+        found = list(documents.merge_lines("a\n<<<\nx\n=======\ny\n>>>>>>> other\n```text\n===\n```\n> quoted\n"))
+        self.assertEqual([fault.split(":")[0] for fault in found], ["2", "4", "6"])
+
+
 class Plots(unittest.TestCase):
     def test_a_text_beyond_the_edge_is_named(self) -> None:
         text = '<text x="{}" y="9" text-anchor="{}" font-size="10">\n{}\n</text>'

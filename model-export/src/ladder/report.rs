@@ -48,7 +48,7 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
 fn traction(text: &mut String, found: &[Traction]) {
     text.push_str(
         "## With traction along the skin\n\n\
-         The truth of this table is the teacher with a coefficient of friction of .5; no network was trained on friction. In\n\
+         The truth of this table is the teacher with a coefficient of friction of 0.5; no network was trained on friction. In\n\
          the set `friction` the indenter goes straight in. In `sliding` it is then dragged aside by up to 1.1 mm; each\n\
          simulation has three states on the way in and two on the way aside. *Pressure alone* is the relative L2 error of the\n\
          SED that a way answers. *With traction* is the error after the session effect `shear_energy` has added SED for the\n\
@@ -85,7 +85,7 @@ fn readings(text: &mut String, found: &Readings) {
     line(text, "pressure", found.pressure);
     line(
         text,
-        "pressure, both maps smoothed by a Gaussian of .1 mm standard deviation",
+        "pressure, both maps smoothed by a Gaussian of 0.1 mm standard deviation",
         found.averaged,
     );
     for (name, apart) in &found.answers {
