@@ -81,15 +81,6 @@ impl Learnt {
     pub fn knows_fe(self) -> bool {
         self != Self::Contact
     }
-
-    /// Whether it learnt such pressure as sessions with this input render.
-    #[must_use]
-    pub fn suits(self, input: Input) -> bool {
-        match input {
-            Input::Pressure => self.knows_fe(),
-            Input::Gaps | Input::Objects => self.knows_contact(),
-        }
-    }
 }
 
 /// The warning about a model that a hello names and that did not learn such pressure as it will get,

@@ -7,7 +7,7 @@ use std::{
 
 use papilla_engine::{
     Card,
-    card::{Index, unlearnt},
+    card::{self, Index},
     error_law::ErrorLaws,
     ladder::Kind,
 };
@@ -45,10 +45,8 @@ pub struct Network {
     pub card: Card,
 }
 
-/// Whether a network learnt such pressure as frames with this input give. What is no network on maps
-/// learnt none and takes any.
 fn suits(card: &Card, input: Input) -> bool {
-    Kind::of_network(&card.network) != Kind::Network || card.learnt().suits(input)
+    Kind::of_network(&card.network).suits(card.learnt(), input)
 }
 
 fn read_card(folder: &Path, name: &str) -> Result<Card, LoadError> {
@@ -101,8 +99,13 @@ impl Model {
         } else {
             Arc::new(Network::read(folder, for_pressure)?)
         };
-        let defaults = [&index.default, index.default_for_pressure()]
-            .map(|default| read_card(folder, default).ok());
+        let defaults = [&index.default, index.default_for_pressure()].map(|default| {
+            let mut loaded = [&network, &for_pressure].into_iter();
+            match loaded.find(|loaded| loaded.card.name == default) {
+                Some(loaded) => Some(loaded.card.clone()),
+                None => read_card(folder, default).ok(),
+            }
+        });
         let hash = &network.model.info().atlas_hash;
         let bundle = Arc::new(Bundle::read(folder, contact, Some(hash))?);
         let interface = Raster::new(&bundle.atlas, Patch::Interface);
@@ -129,7 +132,7 @@ impl Model {
         };
         let default = default.as_ref()?;
         let is_worse = !suits(&network.card, input) && suits(default, input);
-        is_worse.then(|| unlearnt(input, &network.card.name, &default.name))
+        is_worse.then(|| card::unlearnt(input, &network.card.name, &default.name))
     }
 
     /// The networks that were loaded, each once.

@@ -10,6 +10,7 @@
 use std::{env, fs, path::Path};
 
 use anyhow::{Context, bail};
+use papilla_output::atomic;
 use papilla_tests::conformance::{ContactRecorder, Recorder, print};
 use serde_json::Value;
 
@@ -31,7 +32,8 @@ fn main() -> anyhow::Result<()> {
         }
         ["--contact-model", path] => {
             let bytes = ContactRecorder::new(models)?.file()?;
-            fs::write(path, bytes).with_context(|| path.to_owned())?;
+            // Several clients are tested at once, and each has it written anew.
+            atomic::write_changed(Path::new(path), &bytes)?;
             println!("wrote {path}");
             Ok(())
         }
@@ -43,7 +45,7 @@ fn rewrite(path: &str, fill: impl FnOnce(&mut Value) -> anyhow::Result<()>) -> a
     let text = fs::read_to_string(path).with_context(|| path.to_owned())?;
     let mut file = serde_json::from_str(&text).with_context(|| path.to_owned())?;
     fill(&mut file)?;
-    fs::write(path, print(&file)).with_context(|| path.to_owned())?;
+    atomic::write(Path::new(path), print(&file).as_bytes())?;
     println!("{path} is up to date");
     Ok(())
 }

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use papilla_proto::{
     Hello, SampleType,
     atlas::{Atlas, Patch},
-    contact::{AnnouncedFinger, AnnouncedObject, Input, Pose, SampleLayout},
+    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Input, Pose, SampleLayout},
     effects::RuntimeEffect,
     sdf::{AnnouncedShape, Sphere},
 };
@@ -33,7 +33,8 @@ pub enum Contact {
 
 impl Contact {
     /// Puts into a hello what it takes.
-    pub(super) fn ask(self, fingers: u8, hello: &mut Hello) {
+    pub(super) fn ask(self, fingers: u8, method: Option<ContactMethod>, hello: &mut Hello) {
+        hello.method = method;
         let shape = AnnouncedShape::Sphere(Sphere { radius_mm: f64::from(RADIUS_MM) });
         // Poses are f32; --sample-type is that of the answers.
         hello.answer_sample_type = Some(hello.sample_type);

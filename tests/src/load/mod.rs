@@ -194,7 +194,7 @@ impl Target {
             ..Hello::default()
         };
         if let Some(contact) = options.contact {
-            contact.ask(options.fingers, &mut hello);
+            contact.ask(options.fingers, options.method, &mut hello);
         }
         let (ready, mut probe, _) = socket::open(&options.server, &hello).await?;
         probe.close().await;

@@ -7,7 +7,7 @@ use std::{
 };
 
 use clap::{Parser, ValueEnum};
-use papilla_proto::SampleType;
+use papilla_proto::{SampleType, contact::ContactMethod};
 
 use super::contact::Contact;
 
@@ -30,6 +30,8 @@ Examples:
                                                 beside any other Open Inference server
   papilla-load --contact touch --rate-hz 1000 --fingers 2
                                                 poses in, forces out, beside an echo of the bytes
+  papilla-load --contact vertices --method second_order --tier nano --rate-hz 1000 --budget-us 0
+                                                poses in, SED at the vertices out, contact at vertices
   papilla-load --floor                          what the machine itself does
   papilla-load --allow-miss-percent 1 --json    for a script
 
@@ -90,6 +92,11 @@ pub struct Options {
     /// Fingers of a session with --contact; each sends a frame at every instant.
     #[arg(long, default_value = "1", requires = "contact", value_name = "N", value_parser = clap::value_parser!(u8).range(1..=10))]
     pub fingers: u8,
+
+    /// How the service finds the pressure with --contact, such as second_order
+    /// [default: the service's own choice].
+    #[arg(long, requires = "contact", value_name = "NAME", value_parser = method)]
+    pub method: Option<ContactMethod>,
 
     /// Sessions at a time, their frames evenly staggered.
     #[arg(long, default_value = "1", value_name = "K")]
@@ -226,6 +233,12 @@ fn sample_type(text: &str) -> Result<SampleType, String> {
     found.map(|i| SampleType::ALL[i]).ok_or_else(|| format!("there are {}", names.join(", ")))
 }
 
+fn method(text: &str) -> Result<ContactMethod, String> {
+    let found = ContactMethod::ALL.into_iter().find(|method| method.as_str() == text);
+    let names = || ContactMethod::ALL.map(ContactMethod::as_str).join(", ");
+    found.ok_or_else(|| format!("there are {}", names()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -246,10 +259,14 @@ mod tests {
             ["--sample-type", "f64"],
             ["--allow-miss-percent", "-1"],
             ["--fingers", "2"],
+            ["--method", "pixels"],
         ] {
             assert!(parse(&wrong).is_err(), "{wrong:?}");
         }
         assert_eq!(parse(&["--sample-type", "u8"]).unwrap().sample_type, SampleType::U8);
+        let method = |name| parse(&["--contact", "touch", "--method", name]).map(|o| o.method);
+        assert_eq!(method("second_order").unwrap(), Some(ContactMethod::SecondOrder));
+        assert!(method("second").is_err());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use papilla_proto::SampleType;
+use papilla_proto::{SampleType, contact::ContactMethod};
 use serde::{Deserialize, Serialize};
 
 use super::{Arrivals, Contact, Options, Speak, TOLERANCE, Target, tally::Tally, tally::Times};
@@ -70,6 +70,8 @@ pub struct Report {
     pub arrivals: Arrivals,
     /// What answers to poses carried; none: frames were pressure.
     pub contact: Option<Contact>,
+    /// The method that was asked for; none: the service's own choice.
+    pub method: Option<ContactMethod>,
     /// Fingers of a session.
     pub fingers: u8,
     /// Samples on the wire.
@@ -163,6 +165,7 @@ impl Report {
             duration_s: options.duration_s,
             arrivals: options.arrivals,
             contact: options.contact,
+            method: options.method,
             fingers: options.fingers,
             sample_type: options.sample_type,
             budget_us: options.budget(),
@@ -286,6 +289,9 @@ impl fmt::Display for Report {
         if let Some(contact) = self.contact {
             let plural = if self.fingers == 1 { "" } else { "s" };
             writeln!(f, "{} finger{plural}, poses in, {contact:?} out", self.fingers)?;
+            if let Some(method) = self.method {
+                writeln!(f, "contact by {method}")?;
+            }
         }
         write!(f, "tier {}", self.tier)?;
         if let Some(us) = self.predicted_latency_us {

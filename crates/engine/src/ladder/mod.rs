@@ -3,9 +3,9 @@
 //! `model-export ladder` measures it and writes `models/ladder.json`. The server embeds that file,
 //! publishes it, and chooses tiers by it.
 
-use crate::card::{Metrics, Similarity, Spread};
+use crate::card::{Learnt, Metrics, Similarity, Spread};
 use crate::{Backend, EngineError, MODEL_FORMAT};
-use papilla_proto::json;
+use papilla_proto::{contact::Input, json};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -152,6 +152,17 @@ impl Kind {
     #[must_use]
     pub const fn is_network(self) -> bool {
         matches!(self, Self::Network | Self::PublishedUNet)
+    }
+
+    /// Whether it learnt such pressure as frames with this input give. What is no network learnt
+    /// none, and takes any.
+    #[must_use]
+    pub fn suits(self, learnt: Learnt, input: Input) -> bool {
+        !self.is_network()
+            || match input {
+                Input::Pressure => learnt.knows_fe(),
+                Input::Gaps | Input::Objects => learnt.knows_contact(),
+            }
     }
 }
 

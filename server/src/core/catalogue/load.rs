@@ -11,11 +11,12 @@ use papilla_engine::{
 };
 use papilla_proto::{
     atlas::{Atlas, Patch},
+    contact::Input,
     json,
 };
 use serde_json::Value;
 
-use super::{Given, Held, NamedOnly, Tier, TrainedOn, golden};
+use super::{Held, NamedOnly, Tier, TrainedOn, golden};
 use crate::{
     config::Config,
     core::{digest::sha256_hex, latency::Latency},
@@ -106,16 +107,17 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
 /// accurate and no slower.
 fn is_outdone(tier: &Tier, tiers: &[Tier], ladder: &Ladder) -> bool {
     let ms = |tier: &Tier| shipped_ms(ladder, tier);
-    let beats = |better: &Tier, given: Given| {
+    let beats = |better: &Tier, input: Input| {
         ms(better).zip(ms(tier)).is_some_and(|(a, b)| a <= MARGIN * b)
-            && better.error(given) < tier.error(given)
+            && better.error(input) < tier.error(input)
             && better.renders(&tier.effects)
     };
-    let by_another = |given: Given| {
-        let others = tiers.iter().filter(|other| other.named_only.is_none() && other.suits(given));
-        others.into_iter().any(|other| beats(other, given))
+    let by_another = |input: Input| {
+        let others = tiers.iter().filter(|other| other.named_only.is_none() && other.suits(input));
+        others.into_iter().any(|other| beats(other, input))
     };
-    let mut suited = [Given::Pressure, Given::Contact].into_iter().filter(|of| tier.suits(*of));
+    // Gaps count as poses.
+    let mut suited = [Input::Pressure, Input::Objects].into_iter().filter(|of| tier.suits(*of));
     suited.all(by_another)
 }
 

@@ -19,7 +19,7 @@ use papilla_metrics::{TIERS_MAX, TierLabels};
 use papilla_proto::{
     ErrorCode, Problem,
     atlas::{Atlas, Patch, Raster},
-    contact::DEFAULT_FINGER,
+    contact::{DEFAULT_FINGER, Input},
     error::shortened,
 };
 use papilla_render::SkinPixels;
@@ -33,7 +33,7 @@ use self::{
 pub(crate) use self::{
     held::{Held, RETRY_AFTER},
     load::{Loading, ReadCard, Similar},
-    tier::{Given, NamedOnly, Tier, TrainedOn},
+    tier::{NamedOnly, Tier, TrainedOn},
 };
 use crate::{
     StartError,
@@ -343,11 +343,11 @@ impl Catalogue {
         self.offered().map(|(_, t)| t.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
-    /// The default tier for clients of this kind.
-    pub(crate) fn default_for(&self, given: Given) -> usize {
-        match given {
-            Given::Pressure => self.default_for_pressure,
-            Given::Contact => self.default,
+    /// The default tier for frames with this input.
+    pub(crate) fn default_for(&self, input: Input) -> usize {
+        match input {
+            Input::Pressure => self.default_for_pressure,
+            Input::Gaps | Input::Objects => self.default,
         }
     }
 
@@ -361,15 +361,15 @@ impl Catalogue {
         &self,
         budget_us: Option<u32>,
         effects: &[String],
-        given: Given,
+        input: Input,
     ) -> Option<usize> {
         let Some(budget_us) = budget_us else {
             let mut fitting = self.ready_for(effects).map(|(place, _)| place);
-            let default = Some(self.default_for(given));
+            let default = Some(self.default_for(input));
             let default = default.filter(|&tier| self.tiers[tier].renders(effects));
             return default.or_else(|| fitting.next());
         };
-        self.choose_among(budget_us, effects, given, |_| true)
+        self.choose_among(budget_us, effects, input, |_| true)
     }
 
     /// The tier for a budget among those that `may` accepts: the most accurate one that is expected
@@ -378,11 +378,11 @@ impl Catalogue {
         &self,
         budget_us: u32,
         effects: &[String],
-        given: Given,
+        input: Input,
         may: impl Fn(usize) -> bool,
     ) -> Option<usize> {
-        let fitting = || self.for_budgets(effects, given).filter(|&place| may(place));
-        let error = |place: usize| self.tiers[place].error(given);
+        let fitting = || self.for_budgets(effects, input).filter(|&place| may(place));
+        let error = |place: usize| self.tiers[place].error(input);
         fitting()
             .filter(|&place| self.meets(place, Some(budget_us)) == Some(true))
             .min_by(|&a, &b| error(a).total_cmp(&error(b)))
@@ -408,9 +408,9 @@ impl Catalogue {
     pub(crate) fn for_budgets(
         &self,
         effects: &[String],
-        given: Given,
+        input: Input,
     ) -> impl Iterator<Item = usize> {
-        let is_choice = move |tier: &Tier| tier.named_only.is_none() && tier.suits(given);
+        let is_choice = move |tier: &Tier| tier.named_only.is_none() && tier.suits(input);
         let fitting = move || self.ready_for(effects);
         let has_choice = fitting().any(|(_, tier)| is_choice(tier));
         fitting().filter(move |(_, tier)| !has_choice || is_choice(tier)).map(|(place, _)| place)

@@ -85,39 +85,20 @@ pub(crate) enum NamedOnly {
     OnDemand,
 }
 
-/// Where the pressure comes from that a session renders.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Given {
-    /// The client gives it.
-    Pressure,
-    /// The client gives poses or gaps, and contact finds it.
-    Contact,
-}
-
-impl From<Input> for Given {
-    fn from(input: Input) -> Self {
-        match input {
-            Input::Pressure => Self::Pressure,
-            Input::Gaps | Input::Objects => Self::Contact,
-        }
-    }
-}
-
 impl Tier {
-    /// Whether it learnt such pressure. What is no network learnt none and takes any.
-    pub(crate) fn suits(&self, given: Given) -> bool {
-        self.kind != Kind::Network
-            || match given {
-                Given::Pressure => self.learnt.knows_fe(),
-                Given::Contact => self.learnt.knows_contact(),
-            }
+    /// Whether it learnt such pressure as frames with this input give.
+    pub(crate) fn suits(&self, input: Input) -> bool {
+        self.kind.suits(self.learnt, input)
     }
 
-    /// Its median relative L2 error from such pressure.
-    pub(crate) fn error(&self, given: Given) -> f64 {
-        match given {
-            Given::Pressure => self.relative_l2_median,
-            Given::Contact => self.relative_l2_median_from_poses.unwrap_or(self.relative_l2_median),
+    /// Its median relative L2 error from frames with this input.
+    pub(crate) fn error(&self, input: Input) -> f64 {
+        let of_pressure = self.relative_l2_median;
+        match input {
+            Input::Pressure => of_pressure,
+            Input::Gaps | Input::Objects => {
+                self.relative_l2_median_from_poses.unwrap_or(of_pressure)
+            }
         }
     }
 

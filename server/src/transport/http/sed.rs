@@ -13,13 +13,13 @@ use axum::{
 };
 use papilla_codec::Output;
 use papilla_metrics::Transport;
-use papilla_proto::{Problem, contact::DEFAULT_FINGER};
+use papilla_proto::{
+    Problem,
+    contact::{DEFAULT_FINGER, Input},
+};
 
 use crate::{
-    core::{
-        catalogue::Given,
-        scheduler::{Job, JobOptions},
-    },
+    core::scheduler::{Job, JobOptions},
     transport::{
         answer::{
             Answer, Shared, answer, body, refuse,
@@ -64,7 +64,7 @@ async fn render(
     let place = match &query.tier {
         Some(name) => catalogue.tier_named(name)?,
         None => {
-            let chosen = catalogue.choose(query.budget(), &[], Given::Pressure);
+            let chosen = catalogue.choose(query.budget(), &[], Input::Pressure);
             chosen.unwrap_or(catalogue.default_for_pressure)
         }
     };

@@ -28,7 +28,7 @@ use super::{
 use crate::{
     core::{
         buffers::HEADROOM,
-        catalogue::{Catalogue, Given, Tier, places},
+        catalogue::{Catalogue, Tier, places},
         desk::Cancel,
         fingers::Loaded,
     },
@@ -64,8 +64,8 @@ pub(super) struct Terms {
     pub(super) follows: Option<Shape>,
     /// What became of the sealed state that came with the hello; None if there was none.
     pub(super) resumption: Option<Resumption>,
-    /// Where the session's pressure comes from.
-    given: Given,
+    /// What frames hold.
+    input: Input,
     /// What `ready` says of the effects.
     info: ReadyInfo,
     /// The fingers as they were when the terms were agreed on. `ready` takes them, so that a
@@ -267,7 +267,7 @@ fn agree(
     let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
     let budget_us = hello.budget_us.filter(|&us| us > 0);
     let by_budget = budget_us.filter(|_| hello.tier.is_none());
-    let given = Given::from(hello.input.unwrap_or_default());
+    let input = hello.input.unwrap_or_default();
     let loaded = loaded(app, hello)?;
     let mut parts: Vec<Part> = Vec::new();
     let mut part_of = Vec::with_capacity(loaded.len());
@@ -285,7 +285,7 @@ fn agree(
         parts.push(Part {
             finger: catalogue.place,
             tier: catalogue.tier_number(place),
-            budget: by_budget.map(|us| Budget::new(us, wanted.clone(), given)),
+            budget: by_budget.map(|us| Budget::new(us, wanted.clone(), input)),
             contact_us: None,
             atlas_hash: catalogue.atlas.hash().to_owned(),
             first: number,
@@ -331,7 +331,7 @@ fn agree(
         _fingers: fingers,
         follows: (hello.reconnect == Some(true)).then(|| Shape::of(hello)),
         resumption: None,
-        given,
+        input,
         info,
         agreed: loaded,
     })
@@ -345,7 +345,7 @@ fn choose(
     wanted: &[String],
     before: Option<&str>,
 ) -> Result<usize, Problem> {
-    let given = Given::from(hello.input.unwrap_or_default());
+    let input = hello.input.unwrap_or_default();
     let place = match &hello.tier {
         Some(name) => catalogue.tier_named(name)?,
         None => before
@@ -356,8 +356,8 @@ fn choose(
                     && tier.is_loaded()
                     && wanted.iter().all(|effect| tier.effects.contains(effect))
             })
-            .or_else(|| catalogue.choose(hello.budget_us.filter(|&us| us > 0), wanted, given))
-            .unwrap_or_else(|| catalogue.default_for(given)),
+            .or_else(|| catalogue.choose(hello.budget_us.filter(|&us| us > 0), wanted, input))
+            .unwrap_or_else(|| catalogue.default_for(input)),
     };
     let tier = &catalogue.tiers[place];
     if !tier.is_loaded() {
@@ -413,7 +413,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &mut Terms) -> Ready {
     let fingers = || agreed.iter().enumerate();
     let finger_terms = || fingers().map(|(finger, of)| finger_terms(terms, finger, of)).collect();
     let borrowed = fingers().filter_map(|(finger, of)| borrowed(terms, finger, of));
-    let unlearnt = unlearnt(terms.given, tier, &of_first.catalogue);
+    let unlearnt = unlearnt(terms.input, tier, &of_first.catalogue);
     let unlearnt = unlearnt.filter(|_| terms.info.shows_sed);
     Ready {
         version: PROTOCOL_VERSION.into(),
@@ -514,15 +514,11 @@ fn finger_terms(terms: &Terms, finger: usize, of: &Loaded) -> FingerTerms {
 
 /// The warning about a tier that the hello names and that did not learn such pressure as it will get,
 /// where the default did.
-fn unlearnt(given: Given, tier: &Tier, catalogue: &Catalogue) -> Option<Warning> {
-    let default = &catalogue.tiers[catalogue.default_for(given)];
-    if tier.suits(given) || !default.suits(given) {
+fn unlearnt(input: Input, tier: &Tier, catalogue: &Catalogue) -> Option<Warning> {
+    let default = &catalogue.tiers[catalogue.default_for(input)];
+    if tier.suits(input) || !default.suits(input) {
         return None;
     }
-    let input = match given {
-        Given::Pressure => Input::Pressure,
-        Given::Contact => Input::Objects,
-    };
     Some(card::unlearnt(input, &tier.name, &default.name))
 }
 

@@ -5,7 +5,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::core::catalogue::{Catalogue, Given};
+use papilla_proto::contact::Input;
+
+use crate::core::catalogue::Catalogue;
 
 /// Late frames after which a session changes to a faster tier. Two more may be on their way then.
 const LATE_MOST: u32 = 8;
@@ -58,8 +60,8 @@ pub(super) struct Budget {
     budget_us: u32,
     /// Effects that the tier has to render.
     effects: Vec<String>,
-    /// Where the session's pressure comes from.
-    given: Given,
+    /// What frames hold.
+    input: Input,
     changed: Option<Instant>,
     try_after: Duration,
     /// Whether the last change was to a more accurate tier.
@@ -67,8 +69,8 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    pub(super) fn new(budget_us: u32, effects: Vec<String>, given: Given) -> Self {
-        Self { budget_us, effects, given, changed: None, try_after: TRY_AFTER, has_climbed: false }
+    pub(super) fn new(budget_us: u32, effects: Vec<String>, input: Input) -> Self {
+        Self { budget_us, effects, input, changed: None, try_after: TRY_AFTER, has_climbed: false }
     }
 
     /// The place of the tier to change to for the next frame; None: stay with `tier`. Allocates
@@ -97,7 +99,7 @@ impl Budget {
         } else {
             None
         }?;
-        let error = |tier: usize| catalogue.tiers[tier].error(self.given);
+        let error = |tier: usize| catalogue.tiers[tier].error(self.input);
         let climbs = error(next) < error(tier);
         self.try_after = match (self.has_climbed, climbs) {
             (true, false) => (2 * self.try_after).min(TRY_AFTER_MOST),
@@ -115,16 +117,16 @@ impl Budget {
     fn faster(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
         let time_us = catalogue.predicted_latency_us(tier);
         let is_faster = |place: usize| catalogue.predicted_latency_us(place) < time_us;
-        catalogue.choose_among(self.budget_us, &self.effects, self.given, is_faster)
+        catalogue.choose_among(self.budget_us, &self.effects, self.input, is_faster)
     }
 
     /// Among the tiers that are more accurate than this one and may keep the budget, the most
     /// accurate.
     fn more_accurate(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
         let most_us = SHARE_TO_CLIMB * f64::from(self.budget_us);
-        let error = |tier: usize| catalogue.tiers[tier].error(self.given);
+        let error = |tier: usize| catalogue.tiers[tier].error(self.input);
         catalogue
-            .for_budgets(&self.effects, self.given)
+            .for_budgets(&self.effects, self.input)
             .filter(|&place| error(place) < error(tier))
             .filter(|&place| catalogue.hoped_latency_us(place, tier) as f64 <= most_us)
             .min_by(|&a, &b| error(a).total_cmp(&error(b)))

@@ -3,7 +3,9 @@
 use papilla_engine::Backend;
 
 use super::*;
-use crate::core::catalogue::{Given, testing};
+use papilla_proto::contact::Input;
+
+use crate::core::catalogue::testing;
 
 /// Error and shipped time (us) of the tiers, fastest first.
 const TIERS: [(f64, u64); 4] = [(0.07, 200), (0.03, 1400), (0.026, 4800), (0.025, 9400)];
@@ -27,8 +29,8 @@ impl Simulated {
             tier
         };
         let catalogue = testing::catalogue(TIERS.map(tier).into());
-        let tier = catalogue.choose(Some(BUDGET_US), &[], Given::Pressure).unwrap();
-        let budget = Budget::new(BUDGET_US, Vec::new(), Given::Pressure);
+        let tier = catalogue.choose(Some(BUDGET_US), &[], Input::Pressure).unwrap();
+        let budget = Budget::new(BUDGET_US, Vec::new(), Input::Pressure);
         Self { catalogue, budget, counts: FrameCounts::default(), tier, now: Instant::now() }
     }
 
@@ -63,7 +65,7 @@ fn a_tier_that_answers_nothing_lasts_ten_frames() {
     assert!(session.late(60, 5.0) <= 10);
     assert_eq!(session.tier, 1, "7 ms: the most accurate that fits, without a stop between");
     // The next session profits from what was measured.
-    assert_eq!(session.catalogue.choose(Some(BUDGET_US), &[], Given::Pressure), Some(1));
+    assert_eq!(session.catalogue.choose(Some(BUDGET_US), &[], Input::Pressure), Some(1));
 }
 
 #[test]
