@@ -2,7 +2,7 @@
 
 from members import CONTACT, EFFECTS, ENUMERATIONS, HELLO, PARAMETERS, PART, SHAPES, Enumeration, Member, Structure
 
-HEAD = """// Made by clients/hello/generate of clients/hello/members.py: edit that one.
+HEAD = """// Generated: run clients/hello/generate, which makes it of clients/hello/members.py. Edit that file, not this one.
 // What a session asks for, as types; hello_text.hpp says them on the wire.
 #pragma once
 

@@ -2,7 +2,7 @@
 
 from members import ENUMERATIONS, HELLO, SAMPLE_TYPE, STRUCTURES, Enumeration, Member, Structure
 
-HEAD = """// Made by clients/hello/generate of clients/hello/members.py: edit that one.
+HEAD = """// Generated: run clients/hello/generate, which makes it of clients/hello/members.py. Edit that file, not this one.
 using System;
 using System.Collections.Generic;
 using Newtonsoft.Json.Linq;

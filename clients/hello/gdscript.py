@@ -2,7 +2,7 @@
 
 from members import ENUMERATIONS, HELLO, STRUCTURES, Member, Structure
 
-HEAD = '''# Made by clients/hello/generate of clients/hello/members.py: edit that one.
+HEAD = '''# Generated: run clients/hello/generate, which makes it of clients/hello/members.py. Edit that file, not this one.
 # What a session asks for, as types: docs/reference/protocol-hello.md. Members that are not set take the service's default.
 #
 #   var ball = Hello.TouchObject.new().with({"shape": Hello.ShapeSphere.new().with({"radius_mm": 10.0})})

@@ -7,7 +7,7 @@ out is 0 (-1 where 0 says something), and a shape is one structure with the dime
 from csharp import pascal
 from members import CONTACT, EFFECTS, ENUMERATIONS, HELLO, PARAMETERS, PART, SAMPLE_TYPE, SHAPES, Enumeration, Member, Structure
 
-HEAD = """// Made by clients/hello/generate of clients/hello/members.py: edit that one.
+HEAD = """// Generated: run clients/hello/generate, which makes it of clients/hello/members.py. Edit that file, not this one.
 // What a session asks for, as Unreal's editor and Blueprints show it; papilla/hello.hpp says it to the service.
 #pragma once
 

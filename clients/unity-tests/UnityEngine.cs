@@ -135,7 +135,7 @@ namespace UnityEngine
 
 namespace UnityEngine.XR
 {
-    public enum XRNode { CenterEye }
+    public enum XRNode { CenterEye, RightHand }
 
     public struct InputFeatureUsage<T> { }
 
@@ -145,8 +145,16 @@ namespace UnityEngine.XR
         public static readonly InputFeatureUsage<Quaternion> centerEyeRotation;
     }
 
+    public struct HapticCapabilities
+    {
+        public bool supportsImpulse { get { return false; } }
+    }
+
     public struct InputDevice
     {
+        public bool TryGetHapticCapabilities(out HapticCapabilities capabilities) { capabilities = new HapticCapabilities(); return false; }
+        public bool SendHapticImpulse(uint channel, float amplitude, float duration) { return false; }
+        public void StopHaptics() { }
         public bool TryGetFeatureValue(InputFeatureUsage<Vector3> usage, out Vector3 value) { value = new Vector3(); return false; }
         public bool TryGetFeatureValue(InputFeatureUsage<Quaternion> usage, out Quaternion value) { value = new Quaternion(); return false; }
     }

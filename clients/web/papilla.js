@@ -3,7 +3,7 @@
 export { PapillaError } from './src/error.js';
 export { postPressure } from './src/http.js';
 export { Atlas } from './src/atlas.js';
-export { Device, actuators, force, vibrate } from './src/devices.js';
+export { Device, actuators, force, spikeRate, vibrate } from './src/devices.js';
 export { Foundation } from './src/foundation.js';
 export { DRAWN_TURN, JOINTS, feltInWorld, fingerOfJoints, placeOf, poseInFinger, vertexDrawn, vertexMm } from './src/frames.js';
 export { Hand } from './src/hand.js';

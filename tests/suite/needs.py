@@ -1,5 +1,6 @@
 """What parts of the suite need beyond the Rust toolchain: how it is installed, and whether it is there."""
 
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -9,9 +10,14 @@ from pathlib import Path
 PACKAGES = {
     "ccx": "calculix-ccx",
     "chromium": "chromium",
+    "g++": "g++",
     "cmake": "cmake",
     "pkg-config": "pkg-config",
     "godot3-server": "godot3-server",
+    # The same with a window, for the picture of the example. xvfb only recommends xauth, and xvfb-run needs it.
+    "godot3": "godot3",
+    "xvfb-run": "xvfb",
+    "xauth": "xauth",
     "qemu-x86_64": "qemu-user",
     "mcs": "mono-mcs",
     "mono": "mono-runtime",
@@ -26,8 +32,11 @@ AS_ROOT = 'as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; };'
 
 def packages_missing() -> str:
     """Debian packages that are not here yet, in one line."""
-    here = {name: shutil.which(name) or os.path.exists(name) for name in PACKAGES}
-    return " ".join(package for name, package in PACKAGES.items() if not here[name])
+    missing = [package for name, package in PACKAGES.items() if not (shutil.which(name) or os.path.exists(name))]
+    # Debian parts from its Python what `python3 -m venv` needs.
+    if importlib.util.find_spec("ensurepip") is None:
+        missing.append("python3-venv")
+    return " ".join(missing)
 
 
 def install_packages() -> str:
@@ -36,6 +45,11 @@ def install_packages() -> str:
         return "echo 'nothing to install'"
     options = "-y -qq --no-install-recommends"
     return f"{AS_ROOT} as_root apt-get update -qq; as_root apt-get install {options} {missing}"
+
+
+def no_display() -> str | None:
+    missing = [package for name, package in (("godot3", "godot3"), ("xvfb-run", "xvfb"), ("xauth", "xauth")) if not shutil.which(name)]
+    return f"no Godot 3 that draws, or no display for it: apt install {' '.join(missing)}" if missing else None
 
 
 def no_godot4() -> str | None:

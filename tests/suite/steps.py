@@ -14,6 +14,7 @@ from needs import (
     install_slurm,
     no_buildah,
     no_cmake,
+    no_display,
     no_godot4,
     no_haproxy,
     no_musl,
@@ -138,7 +139,7 @@ def installs() -> list[Step]:
     return [
         Step(
             "packages",
-            "Debian packages: CalculiX, Chromium, Godot 3, Mono, QEMU",
+            "Debian packages: CalculiX, Chromium, Godot 3, Mono, QEMU, Xvfb",
             install_packages(),
             installs=f"apt: {packages_missing() or 'nothing'} (56 s where measured)",
         ),
@@ -233,6 +234,13 @@ def full() -> list[Step]:
         Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 80),
         Step("godot-generated", "the Godot 4 add-on is what its source makes", "clients/hello/generate --check\nclients/godot/generate --check"),
         Step("client-godot3", "the Godot 3 add-on", f"{client} godot3", ("build", "packages"), 33),
+        Step(
+            "godot3-picture",
+            "the Godot 3 example, drawn by a software renderer and looked at",
+            f"{client} godot3-picture",
+            after=("build", "packages"),
+            missing=no_display,
+        ),
         Step(
             "client-godot4",
             "the Godot 4 add-on",

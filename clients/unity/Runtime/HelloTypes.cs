@@ -1,4 +1,4 @@
-// Made by clients/hello/generate of clients/hello/members.py: edit that one.
+// Generated: run clients/hello/generate, which makes it of clients/hello/members.py. Edit that file, not this one.
 using System;
 using System.Collections.Generic;
 using Newtonsoft.Json.Linq;

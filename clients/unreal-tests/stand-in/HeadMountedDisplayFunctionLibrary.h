@@ -1,6 +1,6 @@
 #pragma once
 #include "CoreMinimal.h"
-enum class EControllerHand : uint8 { Left, Right };
+#include "InputCoreTypes.h"
 enum class EHandKeypoint : uint8 { IndexDistal = 9, IndexTip = 10 };
 struct FXRMotionControllerData {
   bool bValid = false;

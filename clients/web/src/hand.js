@@ -18,6 +18,7 @@ import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, V
  * @typedef {object} HandAnswer
  * @property {number} sequence
  * @property {number} finger
+ * @property {number} clientTimeUs when the frame was sent, by the browser's clock
  * @property {Touch} touch
  * @property {Float32Array} errorEstimate how wrong this answer is likely to be (ERROR_ESTIMATE); infinite: not stated
  * @property {Float32Array | null} pressurePa as a map or at the vertices, if asked for
@@ -327,6 +328,7 @@ function read(data, view, ready) {
   return {
     sequence: view.getUint32(8, true),
     finger: view.getUint8(47),
+    clientTimeUs,
     touch: touchOf(of('touch') ?? new Float32Array(16)),
     errorEstimate: of('error_estimate') ?? new Float32Array(4).fill(Infinity),
     pressurePa: of('pressure'),

@@ -55,10 +55,11 @@ export async function until(page, what, holds, name) {
   });
 }
 
-/** Opens the scene with an emulated headset on. @param {import('playwright-core').Browser} browser */
-export async function openHeadset(browser) {
+/** Opens the scene with an emulated headset on. @param {import('playwright-core').Browser} browser @param {string} [first] script to run before the page's own */
+export async function openHeadset(browser, first = '') {
   const iwer = await readFile(new URL('../node_modules/iwer/build/iwer.js', import.meta.url), 'utf8');
-  const scene = await openScene(browser, `${iwer}
+  const scene = await openScene(browser, `${first}
+    ${iwer}
     globalThis.headset = new IWER.XRDevice(IWER.metaQuest3);
     globalThis.headset.installRuntime({ forceInstall: true });`);
   await scene.page.waitForSelector('#enter:not([hidden])');

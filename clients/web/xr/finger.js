@@ -13,6 +13,16 @@ const GRADIENT_STEP_MM = 0.01;
 /** The brightest colour is never of less than a light touch makes, J/m3. */
 const LEAST_SED = 40;
 
+/** What the brightest colour stands for, the same on all fingers. */
+export class Scale {
+  sed = LEAST_SED;
+
+  /** Grows at once, shrinks slowly. @param {number} sedMax J/m3 */
+  follow(sedMax) {
+    this.sed = Math.max(LEAST_SED, sedMax, 0.99 * this.sed);
+  }
+}
+
 const VERTEX = `
 varying vec2 place;
 varying vec3 facing;
@@ -45,9 +55,10 @@ void main() {
 }`;
 
 export class Finger {
-  /** @param {import('../papilla.js').Atlas} atlas @param {string} name */
-  constructor(atlas, name) {
+  /** @param {import('../papilla.js').Atlas} atlas @param {string} name @param {Scale} scale */
+  constructor(atlas, name, scale) {
     this.name = name;
+    this.scale = scale;
     this.atlas = atlas;
     this.foundation = new Foundation();
     this.restMm = atlas.skin.positionsMm;
@@ -57,7 +68,6 @@ export class Finger {
     /** What is touched, and how deep; null for nothing. @type {import('./objects.js').Touchable | null} */
     this.touched = null;
     this.deepestMm = 0;
-    this.greatestSed = LEAST_SED;
     this.sedMax = 0;
     this.forceN = 0;
     this.flags = '';
@@ -182,9 +192,8 @@ export class Finger {
     this.sedMax = sedMax;
     this.forceN = forceN;
     this.flags = flags;
-    // Grows at once, shrinks slowly.
-    this.greatestSed = Math.max(LEAST_SED, sedMax, 0.99 * this.greatestSed);
-    this.#paint(sed, this.greatestSed);
+    this.scale.follow(sedMax);
+    this.#paint(sed, this.scale.sed);
     this.arrow.show(touch);
   }
 

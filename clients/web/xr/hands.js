@@ -1,6 +1,7 @@
 // What moves the fingers: a tracked hand or a controller in VR, the mouse (or a touch) otherwise.
 
 import { SPACING } from './objects.js';
+import { Drag } from './grab.js';
 import { Plane, Quaternion, Raycaster, Vector2, Vector3 } from 'three';
 import { DRAWN_TURN, JOINTS, fingerOfJoints } from '../papilla.js';
 
@@ -43,13 +44,14 @@ function spread(meshes, at, turn) {
     if (mesh.visible) place(mesh, BESIDE.set(n * SPACING, 0, 0).add(at), turn);
   });
 }
-/** The mouse points at a place of an object or the table; pressed, the finger comes down there. */
+/** The mouse points at a place of an object or the table; pressed, the finger comes down there. Its right button drags objects. */
 export class Pointer {
   /** @param {HTMLCanvasElement} canvas @param {import('three').Camera} camera @param {import('./objects.js').Touchable[]} objects */
   constructor(canvas, camera, objects) {
     this.camera = camera;
     this.meshes = objects.map(({ mesh }) => mesh);
     this.depthMm = 1.2;
+    this.#drag = new Drag(objects);
     this.#listen(canvas);
   }
 
@@ -60,6 +62,7 @@ export class Pointer {
   #aim = new Vector3(0, 0.9, -0.75);
   #place = new Vector3();
   #table = new Plane(new Vector3(0, 1, 0), -0.9);
+  #drag;
   #isPressed = false;
   #heightMm = HOVER_MM;
 
@@ -67,18 +70,29 @@ export class Pointer {
   #listen(canvas) {
     const move = (/** @type {PointerEvent} */ event) => (this.#at ??= new Vector2()).set((2 * event.clientX) / canvas.clientWidth - 1, 1 - (2 * event.clientY) / canvas.clientHeight);
     canvas.addEventListener('pointermove', move);
-    canvas.addEventListener('pointerdown', (event) => { move(event); this.#isPressed = true; canvas.setPointerCapture(event.pointerId); });
-    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => { this.#isPressed = false; });
+    canvas.addEventListener('pointerdown', (event) => {
+      move(event);
+      canvas.setPointerCapture(event.pointerId);
+      this.#isPressed = event.button === 0;
+      if (event.button === 2) this.#drag.begin(this.#aimed());
+    });
+    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => { this.#isPressed = false; this.#drag.end(); });
+    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
     canvas.addEventListener('wheel', (event) => {
       event.preventDefault();
       this.depthMm = Math.min(1.8, Math.max(0.2, this.depthMm - event.deltaY * 0.001));
     }, { passive: false });
   }
 
-  /** @param {Mesh[]} meshes of the fingers @param {number} seconds since the last call */
-  move(meshes, seconds) {
+  #aimed() {
     if (this.#at) this.#ray.setFromCamera(this.#at, this.camera);
     else this.#ray.set(ABOVE, DOWN);
+    return this.#ray;
+  }
+
+  /** @param {Mesh[]} meshes of the fingers @param {number} seconds since the last call */
+  move(meshes, seconds) {
+    this.#drag.move(this.#aimed());
     const [hit] = this.#ray.intersectObjects(this.meshes);
     if (hit) this.#aim.copy(hit.point);
     else this.#ray.ray.intersectPlane(this.#table, this.#aim)?.clamp(TABLE.near, TABLE.far);
@@ -98,6 +112,18 @@ export class Hands {
     this.hands = [1, 0].map((n) => xr.getHand(n));
     this.controllers = [1, 0].map((n) => xr.getController(n));
     for (const one of [...this.hands, ...this.controllers]) scene.add(one);
+    for (const one of this.controllers) {
+      one.addEventListener('connected', ({ data }) => this.#gamepads.set(one, data.gamepad ?? null));
+      one.addEventListener('disconnected', () => this.#gamepads.delete(one));
+    }
+  }
+
+  /** @type {Map<import('three').Object3D, Gamepad | null>} */ #gamepads = new Map();
+
+  /** That of the controller that moves the fingers; null: it has none, or a hand moves them. */
+  get gamepad() {
+    const controller = this.controllers.find((one) => one.visible);
+    return (controller && this.#gamepads.get(controller)) ?? null;
   }
 
   #place = new Vector3();

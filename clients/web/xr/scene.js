@@ -5,8 +5,10 @@ import {
 } from 'three';
 import { Atlas } from '../papilla.js';
 import { BASE } from './base.js';
-import { Finger } from './finger.js';
+import { Finger, Scale } from './finger.js';
+import { Hold } from './grab.js';
 import { FINGERS, Hands, Pointer } from './hands.js';
+import { Motors } from './motors.js';
 import { makeObjects } from './objects.js';
 import { Solved, Springs } from './touching.js';
 
@@ -14,8 +16,10 @@ import { Solved, Springs } from './touching.js';
 const MM_TO_WORLD = 0.012;
 const SHOWN_MM_TO_WORLD = 0.03;
 const WORDS_MS = 200;
-/** A line for each finger. */
-const BOARD_PX = { width: 768, height: 184 };
+/** A line for each finger, and the legend below. */
+const BOARD_PX = { width: 768, height: 240 };
+/** As the page's own legend has them. */
+const LEGEND = ['#d8a98f', '#280b54', '#65156e', '#9f2a63', '#d44842', '#f57d15', '#fac228', '#fcffa4'];
 /** So far from the middle the outermost object reaches, in the world's units. */
 const OBJECTS_HALF_WIDTH = 0.85;
 /** One frame of a headset; `?tier=NAME&budget_us=N` in the address says otherwise. */
@@ -42,14 +46,20 @@ class Board {
     this.mesh.position.set(-0.95, 1.95, -1.5);
   }
 
-  /** @param {string} text */
-  write(text) {
+  /** @param {string} text @param {string} most what the brightest colour stands for */
+  write(text, most) {
     const context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext('2d'));
     context.fillStyle = '#20242a';
     context.fillRect(0, 0, BOARD_PX.width, BOARD_PX.height);
     context.fillStyle = '#e8e8e8';
     context.font = '26px system-ui, sans-serif';
     text.split('\n').forEach((line, n) => context.fillText(line, 12, 34 + 34 * n));
+    const bar = context.createLinearGradient(12, 0, 312, 0);
+    LEGEND.forEach((colour, n) => bar.addColorStop(n / (LEGEND.length - 1), colour));
+    context.fillStyle = bar;
+    context.fillRect(12, BOARD_PX.height - 40, 300, 24);
+    context.fillStyle = '#e8e8e8';
+    context.fillText(`0 to ${most} under the skin`, 326, BOARD_PX.height - 19);
     this.texture.needsUpdate = true;
   }
 }
@@ -111,7 +121,9 @@ async function start() {
   const atlas = await Atlas.load(BASE);
   const { methods } = await (await fetch(`${BASE}/v1/tiers`)).json();
   const isSolved = methods !== null;
-  const fingers = FINGERS.slice(0, isSolved ? FINGERS.length : 1).map((name) => new Finger(atlas, name));
+  const scale = new Scale();
+  const fingers = FINGERS.slice(0, isSolved ? FINGERS.length : 1).map((name) => new Finger(atlas, name, scale));
+  const motors = new Motors(fingers.length);
   const [finger] = fingers;
   // The first finger, larger, its pad towards the viewer and its tip up.
   const shown = finger.picture();
@@ -131,12 +143,13 @@ async function start() {
 
   const hello = { ...wish(), atlas_hash: atlas.hash };
   const tell = (/** @type {string} */ words) => { element('state').textContent = `${words}; ${(isSolved ? Solved : Springs).words}`; };
-  const touching = isSolved ? new Solved(fingers, objects, hello, tell) : new Springs(fingers, hello, tell);
+  const touching = isSolved ? new Solved(fingers, objects, hello, tell, motors) : new Springs(fingers, hello, tell, motors);
   scene.userData.camera = camera;
-  const state = { renderer, scene, finger, fingers, objects, touching, frames: 0, isPresenting: false };
+  const state = { renderer, scene, finger, fingers, objects, motors, touching, frames: 0, isPresenting: false };
 
   const pointer = new Pointer(renderer.domElement, camera, objects);
   const hands = new Hands(renderer.xr, scene);
+  const hold = new Hold(renderer.xr, objects);
   let [lastMs, wordsMs] = [0, 0];
   renderer.setAnimationLoop((nowMs) => {
     const seconds = Math.min(0.1, (nowMs - lastMs) / 1000);
@@ -145,16 +158,22 @@ async function start() {
     // The page's own words say the same.
     board.mesh.visible = state.isPresenting;
     if (!state.isPresenting) pointer.move(meshes, seconds);
-    else hands.move(meshes);
+    else {
+      hold.move();
+      hands.move(meshes);
+    }
     for (const one of fingers) if (one.mesh.visible) one.touch(objects);
     touching.step();
     for (const one of fingers) one.dent();
+    motors.step(state.isPresenting ? hands.gamepad : null);
     if (nowMs - wordsMs > WORDS_MS) {
       wordsMs = nowMs;
       const lines = fingers.filter((one) => one.mesh.visible && one.touched).map(inWords);
       const text = lines.length ? lines.join('\n') : 'nothing touched';
+      const most = `${scale.sed.toFixed(0)} J/m3`;
       element('figures').textContent = text;
-      board.write(text);
+      element('most').textContent = most;
+      board.write(text, most);
     }
     renderer.render(scene, camera);
     state.frames++;

@@ -29,8 +29,8 @@ export class Springs {
   #late = 0;
   #finger;
 
-  /** @param {Finger[]} fingers @param {Hello} hello @param {(words: string) => void} onstate */
-  constructor([finger], hello, onstate) {
+  /** @param {Finger[]} fingers @param {Hello} hello @param {(words: string) => void} onstate @param {import('./motors.js').Motors} motors */
+  constructor([finger], hello, onstate, motors) {
     this.#finger = finger;
     this.session = new Session(BASE, hello);
     this.session.onstate = (now, why) => onstate(why ? `${now}: ${why}` : now);
@@ -42,6 +42,7 @@ export class Springs {
         hello = { ...hello, budget_us: 2 * (hello.budget_us ?? 0) };
         this.session.renew(hello);
       }
+      motors.feed(answer);
       if (answer.status !== 'ok' || !answer.summary) return;
       const of = (/** @type {typeof SUMMARY[number]} */ name) => /** @type {Float32Array} */ (answer.summary)[SUMMARY.indexOf(name)];
       finger.feel(answer.map, of('sed_max_j_per_m3'), of('force_n'), null, inWords(answer));
@@ -61,6 +62,7 @@ export class Solved {
   /** @type {Hand | null} */ session = null;
   #fingers;
   #objects;
+  #motors;
   #busy;
   #isTracked;
   #onstate;
@@ -68,8 +70,9 @@ export class Solved {
   #map = new Float32Array(MAP_LEN);
   #turn = new Quaternion();
 
-  /** @param {Finger[]} fingers @param {Touchable[]} objects @param {Hello} hello @param {(words: string) => void} onstate */
-  constructor(fingers, objects, { tier, atlas_hash }, onstate) {
+  /** @param {Finger[]} fingers @param {Touchable[]} objects @param {Hello} hello @param {(words: string) => void} onstate @param {import('./motors.js').Motors} motors */
+  constructor(fingers, objects, { tier, atlas_hash }, onstate, motors) {
+    this.#motors = motors;
     this.#fingers = fingers;
     this.#objects = objects;
     this.#busy = fingers.map(() => false);
@@ -104,7 +107,7 @@ export class Solved {
         // The hand has left the cameras' view: told once, so that nothing bursts when it comes back.
         if (!this.#isTracked[number] || this.#busy[number]) return;
         this.#isTracked[number] = false;
-        hand.notTracked({ finger: number }).catch(() => {});
+        hand.notTracked({ finger: number }).then((answer) => this.#motors.feed(answer), () => {});
         return;
       }
       this.#isTracked[number] = true;
@@ -113,7 +116,10 @@ export class Solved {
       if (this.#busy[number]) return;
       this.#busy[number] = true;
       hand.touch(this.#objects.map((object) => this.#poseOf(object, finger)), { finger: number })
-        .then((answer) => this.#feel(finger, answer), ({ code, message }) => {
+        .then((answer) => {
+          this.#motors.feed(answer);
+          this.#feel(finger, answer);
+        }, ({ code, message }) => {
           // Such a frame is followed by the next.
           if (!MISSED.includes(code)) this.#onstate(`refused: ${message}`);
         })

@@ -9,7 +9,7 @@ use tempfile::NamedTempFile;
 
 use crate::{
     effects::windowed,
-    support::{PRESSURE_MAX_PA, Service, Socket, add_model, contact, hello, model_folder},
+    support::{PRESSURE_MAX_PA, Received, Service, Socket, add_model, contact, hello, model_folder},
 };
 
 /// A file of one key, and settings that name it.
@@ -161,6 +161,25 @@ async fn what_cannot_be_resumed_starts_anew_and_is_told_why() {
     let mut anew = one.socket().await;
     let ready = anew.resume(hello(&json!({"reconnect": true})), nothing).await;
     assert_eq!(ready["state"], "nothing", "{ready}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_request_for_a_state_is_answered() {
+    let one = Service::start().await;
+    let mut socket = one.socket().await;
+    let mut hello = creeping();
+    hello["tier"] = json!("slow");
+    socket.open(hello).await;
+    // Both requests come while the frame is rendered, as from a client that gave up on the first.
+    socket.send(windowed(1, 11_111, Window::WHOLE, &press(1))).await;
+    for _ in 0..2 {
+        socket.send(r#"{"type": "seal"}"#).await;
+    }
+    let (header, _) = socket.hear_frame().await;
+    assert_eq!((header.sequence, header.status), (1, FrameStatus::Ok));
+    for _ in 0..2 {
+        assert!(matches!(socket.receive().await, Received::Sealed(_)), "a sealed state is due");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

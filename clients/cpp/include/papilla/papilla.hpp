@@ -4,11 +4,13 @@
 //   session.hpp  Session: many maps over a WebSocket, the latest frame wins
 //   http.hpp     sed(): one map; http()
 //   atlas.hpp    Atlas: pressure maps from vertices or contact points
+//   device.hpp   Device: what a haptic device takes of the answers
 //   core.hpp     Core: a session without socket and threads, for engines that bring their own
 #pragma once
 
 #include "atlas.hpp"
 #include "core.hpp"
+#include "device.hpp"
 #include "frames.hpp"
 #include "hello.hpp"
 #include "http.hpp"

@@ -4,6 +4,7 @@
 extends "res://example/joints.gd"
 
 const Atlas = preload("res://addons/papilla/atlas.gd")
+const Device = preload("res://addons/papilla/device.gd")
 const Frames = preload("res://addons/papilla/frames.gd")
 const Hello = preload("res://addons/papilla/hello.gd")
 const Http = preload("res://addons/papilla/http.gd")
@@ -25,6 +26,8 @@ var touches = 0
 # Where the finger was in the last frames, by their sequences: it is drawn where it was when it felt what comes back.
 var _sent = []
 var _was_tracked = false
+# The first gamepad feels the size of the force.
+var _motor = Device.new()
 var _arrays = []
 # The skin's vertices, mm in the finger's frame.
 var _skin_mm = PoolVector3Array()
@@ -57,6 +60,9 @@ func _ready():
 
 
 func _process(_delta):
+	var command = _motor.poll()
+	if command != null:
+		Input.start_joy_vibration(0, command.amplitude, command.amplitude, command.duration_s)
 	var tracked = tracked_finger()
 	_was_tracked = _was_tracked or tracked != null
 	# A hand that was there and is lost is told as that: nothing is felt until it is back.
@@ -86,6 +92,7 @@ func _without_hand():
 
 # No answer came in time, or the server refuses: nothing is felt, and actuators go to zero, until the next answer.
 func _on_answered(answer):
+	_motor.feed(answer)
 	var hand = _sent[answer.sequence % SENT_MAX]
 	# One that was superseded at once has its outcome before its place is kept.
 	if hand != null and answer.status != "superseded":

@@ -1,10 +1,11 @@
-# Made of clients/godot/godot3/example/hands.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/example/hands.gd. Edit that file, not this one.
 # Three objects to touch: a ball of rubber, a plate and a bar. The finger shows the strain energy density under its skin, the arrow the
 # force on it. The finger is that of a tracked hand (joints.gd); without one it visits the objects by itself, and follows the
 # mouse while its left button is held.
 extends "res://example/joints.gd"
 
 const Atlas = preload("res://addons/papilla/atlas.gd")
+const Device = preload("res://addons/papilla/device.gd")
 const Frames = preload("res://addons/papilla/frames.gd")
 const Hello = preload("res://addons/papilla/hello.gd")
 const Http = preload("res://addons/papilla/http.gd")
@@ -26,6 +27,8 @@ var touches = 0
 # Where the finger was in the last frames, by their sequences: it is drawn where it was when it felt what comes back.
 var _sent = []
 var _was_tracked = false
+# The first gamepad feels the size of the force.
+var _motor = Device.new()
 var _arrays = []
 # The skin's vertices, mm in the finger's frame.
 var _skin_mm = PackedVector3Array()
@@ -58,6 +61,9 @@ func _ready():
 
 
 func _process(_delta):
+	var command = _motor.poll()
+	if command != null:
+		Input.start_joy_vibration(0, command.amplitude, command.amplitude, command.duration_s)
 	var tracked = tracked_finger()
 	_was_tracked = _was_tracked or tracked != null
 	# A hand that was there and is lost is told as that: nothing is felt until it is back.
@@ -87,6 +93,7 @@ func _without_hand():
 
 # No answer came in time, or the server refuses: nothing is felt, and actuators go to zero, until the next answer.
 func _on_answered(answer):
+	_motor.feed(answer)
 	var hand = _sent[answer.sequence % SENT_MAX]
 	# One that was superseded at once has its outcome before its place is kept.
 	if hand != null and answer.status != "superseded":

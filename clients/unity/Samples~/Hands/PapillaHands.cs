@@ -6,7 +6,7 @@ using UnityEngine.XR;
 
 /// <summary>
 /// The scene Hands. The right index finger of a tracked hand (package XR Hands) touches three objects. Without a tracked hand the finger
-/// visits them by itself, and follows the mouse while its left button is held. Its skin shows SED, an arrow the force. Needs a running service.
+/// visits them by itself, and follows the mouse while its left button is held. Its skin shows SED, an arrow the force, which a controller in the right hand feels as well. Needs a running service.
 /// </summary>
 public sealed class PapillaHands : MonoBehaviour
 {
@@ -27,6 +27,7 @@ public sealed class PapillaHands : MonoBehaviour
     // Where the finger was in the last frames, by their sequences: it is drawn where it was when it felt what comes back.
     readonly Place[] sent = new Place[256];
     readonly List<Vector3> arrowAt = new List<Vector3>();
+    readonly Device motor = new Device(Device.Force(1));
     Papilla.Pose[] poses;
     Session session;
     Mesh skin;
@@ -54,12 +55,15 @@ public sealed class PapillaHands : MonoBehaviour
     {
         if (skin == null && loaded != null) Draw(loaded);
         FollowHead();
+        DeviceCommand command;
+        if (motor.TryPoll(out command)) Controller.Vibrate(command);
         Place found;
         bool isTracked = HandJoints.TryFinger(rig, out found);
         // A hand that was there and is lost is told as that: nothing is felt until it is back.
         if (wasTracked && !isTracked)
         {
             session.SendNotTracked();
+            Controller.Vibrate(motor.Stop());
             Show(null, last);
             return;
         }
@@ -69,7 +73,11 @@ public sealed class PapillaHands : MonoBehaviour
         for (int k = 0; k < poses.Length; k++) poses[k] = Papilla.Pose.FromUnity(found, objects[k].ToPlace());
         sent[session.SendPoses(poses) % sent.Length] = found;
         Answer answer;
-        if (session.TryTakeLatest(out answer)) Show(answer, sent[answer.Sequence % sent.Length]);
+        if (session.TryTakeLatest(out answer))
+        {
+            motor.Feed(answer);
+            Show(answer, sent[answer.Sequence % sent.Length]);
+        }
         else if (isLost || session.Ready == null) Show(null, found);
     }
 
@@ -159,8 +167,14 @@ public sealed class PapillaHands : MonoBehaviour
         return mesh;
     }
 
+    static InputDevice Controller
+    {
+        get { return InputDevices.GetDeviceAtXRNode(XRNode.RightHand); }
+    }
+
     void OnDestroy()
     {
+        Controller.Vibrate(motor.Stop());
         if (session != null) session.Dispose();
     }
 }

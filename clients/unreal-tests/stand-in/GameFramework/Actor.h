@@ -18,5 +18,7 @@ struct AActor : UObject {
   FVector GetActorLocation() const { return {}; }
   UWorld* GetWorld() const { return nullptr; }
   template <class T>
+  T* FindComponentByClass() const { return nullptr; }
+  template <class T>
   T* CreateDefaultSubobject(FName) { return new T; }
 };

@@ -62,18 +62,21 @@ enum Phase {
 /// Serves the session until one side ends it. Before a drain ends it, every accepted frame is
 /// answered.
 pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> End {
-    let (mut phase, mut is_seal_due) = (Phase::Open, false);
+    // Requests for a sealed state that are not answered. Each has an answer of its own, since clients
+    // count them; the rate of text messages bounds them.
+    let (mut phase, mut seals_due) = (Phase::Open, 0_u32);
     session.set_stay(connection);
     loop {
         let draining = phase == Phase::Draining;
-        if (draining || is_seal_due) && connection.reply.is_settled() {
+        if (draining || seals_due > 0) && connection.reply.is_settled() {
             if draining {
                 return drained();
             }
             session.seal(Arc::clone(&connection.reply), Arc::clone(&connection.app)).await;
-            is_seal_due = false;
+            seals_due -= 1;
+            continue;
         }
-        let wait = Wait { drain: phase == Phase::Open, settled: draining || is_seal_due };
+        let wait = Wait { drain: phase == Phase::Open, settled: draining || seals_due > 0 };
         match connection.next(wait).await {
             Err(end) => return end,
             Ok(Event::Draining) if session.terms.follows.is_some() => {
@@ -97,7 +100,7 @@ pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> 
             }
             Ok(Event::Text(text)) => match hello::parse(connection, &text).await {
                 Ok(Ok(Ok(ClientMessage::Seal))) if session.terms.follows.is_some() => {
-                    is_seal_due = true;
+                    seals_due = seals_due.saturating_add(1);
                 }
                 Ok(Ok(said)) => {
                     if let Err(end) = session.renew(connection, said).await {

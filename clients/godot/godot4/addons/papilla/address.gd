@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/address.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/address.gd. Edit that file, not this one.
 # Where a service is, as every client takes it (docs/reference/clients/README.md), and its token.
 extends RefCounted
 

@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/atlas.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/atlas.gd. Edit that file, not this one.
 # The atlas: which point of the finger each pixel of a map is, and how to fill a map (docs/reference/atlas.md).
 extends RefCounted
 

@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/frame.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/frame.gd. Edit that file, not this one.
 # Frames of the protocol: a header of 48 bytes, little-endian, and what follows.
 extends RefCounted
 

@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/frames.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/frames.gd. Edit that file, not this one.
 # Where nodes are in the finger's frame, and forces back (docs/reference/frames-and-units.md).
 #
 # Godot's world is right-handed, metres: x right, y up, -z ahead. A finger's -z points to its tip, its y out of the nail;

@@ -1,5 +1,5 @@
-# Made of clients/godot/godot3/addons/papilla/hello.gd by clients/godot/generate: edit that one.
-# Made by clients/hello/generate of clients/hello/members.py: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/hello.gd. Edit that file, not this one.
+# Generated: run clients/hello/generate, which makes it of clients/hello/members.py. Edit that file, not this one.
 # What a session asks for, as types: docs/reference/protocol-hello.md. Members that are not set take the service's default.
 #
 #   var ball = Hello.TouchObject.new().with({"shape": Hello.ShapeSphere.new().with({"radius_mm": 10.0})})

@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/http.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/http.gd. Edit that file, not this one.
 # What needs no session: the atlas, and one map at a time. Calls wait for the answer: make them while a scene loads, or in a Thread.
 extends RefCounted
 

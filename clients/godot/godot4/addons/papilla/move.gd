@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/move.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/move.gd. Edit that file, not this one.
 # A session's way to another connection when the service asks for it (docs/reference/protocol-moving.md): the connection is
 # opened while frames go on over the old one; then they wait until the old one has said what the service remembers,
 # sealed, and the new one is ready. Where a step fails, the old connection goes on, and it is tried again.

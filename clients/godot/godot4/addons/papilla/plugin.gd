@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/plugin.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/plugin.gd. Edit that file, not this one.
 @tool
 extends EditorPlugin
 

@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/samples.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/samples.gd. Edit that file, not this one.
 # Samples of maps as they travel, and as arrays of floats.
 extends RefCounted
 

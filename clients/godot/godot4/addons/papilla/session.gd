@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/session.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/session.gd. Edit that file, not this one.
 # A session of Papilla: pressure maps (Pa) or poses of objects out, maps of strain energy density (J/m3) and forces in.
 #
 # Put the node into the scene, connect `map_received` or `touched`, call `send`, `send_window` or `send_poses`. The newest

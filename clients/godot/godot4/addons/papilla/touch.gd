@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/touch.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/touch.gd. Edit that file, not this one.
 # Where things are and what pushes back, as they travel.
 extends RefCounted
 

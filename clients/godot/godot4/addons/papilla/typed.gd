@@ -1,4 +1,4 @@
-# Made of clients/godot/godot3/addons/papilla/typed.gd by clients/godot/generate: edit that one.
+# Generated: run clients/godot/generate, which makes it of clients/godot/godot3/addons/papilla/typed.gd. Edit that file, not this one.
 # What the types of hello.gd share.
 extends RefCounted
 

@@ -7,7 +7,7 @@ public class Papilla : ModuleRules
     {
         PCHUsage = PCHUsageMode.UseExplicitOrSharedPCHs;
         CppStandard = CppStandardVersion.Cpp20;
-        // papilla/answer.hpp throws where an answer is asked for what it does not carry.
+        // papilla/answer.hpp throws where an answer is asked for what it does not carry, papilla/device.hpp where there is no such device.
         bEnableExceptions = true;
         PublicDependencyModuleNames.AddRange(new[] { "Core", "CoreUObject", "Engine" });
         PrivateDependencyModuleNames.AddRange(new[] { "HTTP", "WebSockets" });

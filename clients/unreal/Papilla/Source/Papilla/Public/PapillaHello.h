@@ -1,4 +1,4 @@
-// Made by clients/hello/generate of clients/hello/members.py: edit that one.
+// Generated: run clients/hello/generate, which makes it of clients/hello/members.py. Edit that file, not this one.
 // What a session asks for, as Unreal's editor and Blueprints show it; papilla/hello.hpp says it to the service.
 #pragma once
 

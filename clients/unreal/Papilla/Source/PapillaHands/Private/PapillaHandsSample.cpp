@@ -43,6 +43,7 @@ APapillaHandsSample::APapillaHandsSample()
     PrimaryActorTick.bCanEverTick = true;
     RootComponent = CreateDefaultSubobject<USceneComponent>(TEXT("Root"));
     Session = CreateDefaultSubobject<UPapillaSessionComponent>(TEXT("Session"));
+    Motor = CreateDefaultSubobject<UPapillaDeviceComponent>(TEXT("Motor"));
     Skin = CreateDefaultSubobject<UProceduralMeshComponent>(TEXT("Skin"));
     Skin->SetupAttachment(RootComponent);
     Arrow = CreateDefaultSubobject<UArrowComponent>(TEXT("Force"));
@@ -81,6 +82,7 @@ void APapillaHandsSample::BeginPlay()
     Super::BeginPlay();
     Session->OnTouched.AddDynamic(this, &APapillaHandsSample::HandleTouched);
     Session->OnLost.AddDynamic(this, &APapillaHandsSample::HandleLost);
+    Motor->OnCommand.AddDynamic(this, &APapillaHandsSample::HandleCommand);
     if (APlayerController* const Player = GetWorld()->GetFirstPlayerController()) Player->SetViewTarget(this);
 }
 
@@ -183,6 +185,12 @@ void APapillaHandsSample::HandleLost(int32 Sequence, int32)
     // Nothing is known of the touch any more: nothing is shown, and actuators would go to zero.
     Arrow->SetVisibility(false);
     Paint(false);
+}
+
+void APapillaHandsSample::HandleCommand(float Amplitude, float)
+{
+    // Unreal holds a value until the next one; the last command is one of 0.
+    if (APlayerController* const Player = GetWorld()->GetFirstPlayerController()) Player->SetHapticsByValue(1.0f, Amplitude, EControllerHand::Right);
 }
 
 void APapillaHandsSample::DrawFinger(int32 Sequence)

@@ -4,6 +4,7 @@
 #include "CoreMinimal.h"
 #include "GameFramework/Actor.h"
 #include "GameFramework/GameModeBase.h"
+#include "PapillaDeviceComponent.h"
 #include "PapillaSessionComponent.h"
 
 #include "PapillaHandsSample.generated.h"
@@ -45,6 +46,10 @@ private:
     UFUNCTION()
     void HandleLost(int32 Sequence, int32 Finger);
 
+    /** A controller in the right hand feels the size of the force. */
+    UFUNCTION()
+    void HandleCommand(float Amplitude, float DurationSeconds);
+
     bool FindTrackedFinger(FTransform& Found) const;
     FTransform FingerOfMouse() const;
     void Arrange(double Scale);
@@ -53,6 +58,8 @@ private:
 
     UPROPERTY()
     TObjectPtr<UPapillaSessionComponent> Session;
+    UPROPERTY()
+    TObjectPtr<UPapillaDeviceComponent> Motor;
     UPROPERTY()
     TObjectPtr<UProceduralMeshComponent> Skin;
     UPROPERTY()
