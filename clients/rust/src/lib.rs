@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`Session`] | many maps over a WebSocket; the latest frame wins; reconnects by itself |
 //! | [`sed`] | one map over HTTP, blocking |
+//! | [`device`] | what controllers and gloves take of the answers |
 //! | [`frames`] | poses of engines and robots to the finger's frame, forces back |
 //! | [`Skin`] | pressure maps from values at vertices or from contact points |
 //!
@@ -15,6 +16,7 @@
 
 mod address;
 mod answer;
+pub mod device;
 mod dial;
 mod error;
 pub mod frames;

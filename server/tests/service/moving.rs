@@ -9,7 +9,9 @@ use tempfile::NamedTempFile;
 
 use crate::{
     effects::windowed,
-    support::{PRESSURE_MAX_PA, Received, Service, Socket, add_model, contact, hello, model_folder},
+    support::{
+        PRESSURE_MAX_PA, Received, Service, Socket, add_model, contact, hello, model_folder,
+    },
 };
 
 /// A file of one key, and settings that name it.
