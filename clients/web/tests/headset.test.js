@@ -55,14 +55,14 @@ test('the joints of a hand leave as poses in the frame, and what they feel comes
     // The pad, (9, 0, -6.4) mm in the finger's frame, is where the tip's joint is.
     const origin = at(tip).sub(back.clone().multiplyScalar(9 * scale)).add(nail.clone().multiplyScalar(6.4 * scale));
     const right = nail.clone().cross(back);
-    const due = objects.map(({ mesh }) => {
+    const due = objects.map((/** @type {any} */ { mesh }) => {
       const off = mesh.position.clone().sub(origin).divideScalar(scale);
       return [off.dot(back), off.dot(right), off.dot(nail)];
     });
     // The same poses once more, by a hand of its own: another session, the same contact.
     const poses = objects.map((/** @type {any} */ _, /** @type {number} */ k) => ({ at: rows.slice(7 * k, 7 * k + 3), turn: rows.slice(7 * k + 3, 7 * k + 7) }));
     const { Hand } = await import(/** @type {any} */ ('/xr/papilla.js'));
-    const own = await Hand.connect('', { tier: touching.session.ready.tier, objects: objects.map(({ shape, objectPaPerMm }) => (
+    const own = await Hand.connect('', { tier: touching.session.ready.tier, objects: objects.map((/** @type {any} */ { shape, objectPaPerMm }) => (
       objectPaPerMm === Infinity ? { shape } : { shape, stiffness_mpa_per_mm: 1e-6 * objectPaPerMm })) });
     let once;
     for (let n = 0; n < 5; n++) once = await own.touch(poses);
