@@ -47,8 +47,10 @@ inline ReadLevels device_force(double full_n, double threshold_n = 0.0) {
     if (!answer.has_touch && !answer.has_summary && !answer.no_contact) {
       throw NotCarried("force", "send objects or gaps, or name the effect 'summary' in the hello");
     }
-    const auto& [x, y, z] = answer.touch.force_n;
-    const double found_n = answer.has_touch ? std::hypot(double(x), double(y), double(z)) : answer.has_summary ? double(answer.summary[force_n]) : 0.0;
+    const double x = answer.touch.force_n[0], y = answer.touch.force_n[1], z = answer.touch.force_n[2];
+    // Not std::hypot of three: GCC's takes NaN for 0.
+    const double size_n = std::sqrt(x * x + y * y + z * z);
+    const double found_n = answer.has_touch ? size_n : answer.has_summary ? double(answer.summary[force_n]) : 0.0;
     levels.assign(1, float((found_n - threshold_n) / span_n));
     return true;
   };
