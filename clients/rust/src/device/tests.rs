@@ -87,7 +87,7 @@ fn run(case: &Value, tolerance: f64) {
             let fed = device.feed(&answer_of(&step["feed"]), now);
             match fed {
                 Ok(()) => {
-                    assert!(step.get("refused").or(step.get("not_carried")).is_none(), "{name}")
+                    assert!(step.get("refused").or(step.get("not_carried")).is_none(), "{name}");
                 }
                 Err(DeviceError::Finger { .. }) => assert_eq!(step["refused"], true, "{name}"),
                 Err(DeviceError::Answer(PapillaError::NotCarried { .. })) => {
