@@ -14,10 +14,14 @@ use papilla_proto::{
 use super::{LoadError, content::Encoded, content::get};
 
 const RADIUS_MM: f32 = 10.0;
-/// How deep the ball goes, mm: up and down around this by that, in so many frames.
+/// How deep the ball goes, mm: down and up around this by that.
 const DEPTH_MM: f32 = 0.5;
 const SWING_MM: f32 = 0.3;
-const FRAMES: usize = 64;
+/// Time of one way down and up, s: the same touch at every rate. At most the ball moves by 4.7 mm/s,
+/// which is 52 um from frame to frame at 90 Hz and 5 um at 1 kHz.
+const CYCLE_S: f64 = 0.4;
+/// Frames of a cycle, at any rate.
+const FRAMES: [usize; 2] = [16, 4096];
 
 /// What answers carry, beside what pushes back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize, serde::Deserialize)]
@@ -52,13 +56,14 @@ impl Contact {
 }
 
 /// A ball under the pad that goes down and up, and the hash of the atlas.
-pub(super) async fn poses(server: &str) -> Result<(Encoded, String), LoadError> {
+pub(super) async fn poses(server: &str, rate_hz: f64) -> Result<(Encoded, String), LoadError> {
     let atlas: Atlas = get(server, "/v1/atlas").await?;
     let positions = &atlas.patch(Patch::Skin).positions_mm;
     let lowest = positions.iter().copied().min_by(|a, b| a[2].total_cmp(&b[2]));
     let [x, y, z] = lowest.unwrap_or_default();
-    let payloads = (0..FRAMES).map(|frame| {
-        let depth_mm = DEPTH_MM + SWING_MM * (TAU * frame as f32 / FRAMES as f32).sin();
+    let frames = ((CYCLE_S * rate_hz).round() as usize).clamp(FRAMES[0], FRAMES[1]);
+    let payloads = (0..frames).map(|frame| {
+        let depth_mm = DEPTH_MM + SWING_MM * (TAU * frame as f32 / frames as f32).sin();
         let pose = Pose { origin_mm: [x, y, z - RADIUS_MM + depth_mm], ..Pose::default() };
         pose.encode().to_vec()
     });

@@ -126,9 +126,11 @@ impl Encoded {
         Ok(Self { sample_type, scale, payloads })
     }
 
-    /// Which map `frame` of `session` holds: sessions start at different ones.
-    pub(super) fn index(&self, session: usize, frame: u32) -> usize {
-        (session * 7 + frame as usize) % self.payloads.len()
+    /// Which payload `frame` of `session` holds. Frames of all `fingers` follow one another, so that
+    /// each finger gets one payload after another; sessions and fingers start at different ones.
+    pub(super) fn index(&self, session: usize, frame: u32, fingers: u32) -> usize {
+        let (instant, finger) = (frame / fingers, frame % fingers);
+        (session * 7 + finger as usize * 5 + instant as usize) % self.payloads.len()
     }
 }
 
@@ -143,8 +145,10 @@ mod tests {
         let encoded = Encoded::new(&content, SampleType::U8).unwrap();
         assert_eq!(encoded.scale.to_bits(), 2.0_f32.to_bits());
         assert_eq!(encoded.payloads, [vec![0, 255], vec![1, 1]]);
-        let sent: Vec<_> = (0..3).map(|frame| encoded.index(1, frame)).collect();
+        let sent: Vec<_> = (0..3).map(|frame| encoded.index(1, frame, 1)).collect();
         assert_eq!(sent, [1, 0, 1]);
+        let of_two: Vec<_> = (0..6).map(|frame| encoded.index(0, frame, 2)).collect();
+        assert_eq!(of_two, [0, 1, 1, 0, 0, 1], "each of two fingers gets one map after another");
         let above = Content { maps_pa: vec![vec![7e4]], ..content };
         assert!(matches!(Encoded::new(&above, SampleType::F16), Err(LoadError::BeyondF16(_))));
         assert!(Encoded::new(&above, SampleType::F32).is_ok());

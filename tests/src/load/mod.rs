@@ -149,7 +149,7 @@ enum Opening {
 impl Target {
     async fn new(options: &Options) -> Result<Self, LoadError> {
         let (encoded, source, atlas_hash) = if options.contact.is_some() {
-            let (encoded, atlas_hash) = contact::poses(&options.server).await?;
+            let (encoded, atlas_hash) = contact::poses(&options.server, options.rate_hz).await?;
             (encoded, "a ball that goes down and up".to_owned(), atlas_hash)
         } else {
             let content = match &options.dataset {

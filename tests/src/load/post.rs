@@ -113,7 +113,7 @@ pub(super) async fn run(
             delay.record(shared.plan.intended(session, number).elapsed());
         }
         let header = header(&shared, number);
-        let samples = &shared.encoded.payloads[shared.encoded.index(session, number)];
+        let samples = &shared.encoded.payloads[shared.encoded.index(session, number, 1)];
         match timeout(shared.drain, post.exchange(samples)).await {
             Ok(Ok(answer)) => {
                 ear.frame(Instant::now(), &answer.header(header), &answer.samples);

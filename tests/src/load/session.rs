@@ -83,7 +83,7 @@ fn send(shared: &Shared, session: usize, mut mouth: Mouth) -> (Mouth, Times) {
         if number >= plan.warmup {
             delay.record(intended.elapsed());
         }
-        let payload = &encoded.payloads[encoded.index(session, number)];
+        let payload = &encoded.payloads[encoded.index(session, number, plan.fingers)];
         // Err: the listener hears of it too, and says why, or opens another connection.
         if mouth.send(&header, payload).is_err() && shared.follow.is_none() {
             break;
@@ -291,7 +291,8 @@ impl<'a> Ear<'a> {
 
     fn verify(&mut self, header: &FrameHeader, payload: &[u8]) {
         let Some(reference) = &self.shared.reference else { return };
-        let index = self.shared.encoded.index(self.session, header.sequence);
+        let index =
+            self.shared.encoded.index(self.session, header.sequence, self.shared.plan.fingers);
         let difference = reference.difference(index, header, payload, &mut self.scratch);
         self.tally.compare(difference, TOLERANCE);
     }
