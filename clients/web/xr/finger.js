@@ -13,13 +13,18 @@ const GRADIENT_STEP_MM = 0.01;
 /** The brightest colour is never of less than a light touch makes, J/m3. */
 const LEAST_SED = 40;
 
+/** Skin is drawn so much above what it touches, or both surfaces would show through each other. */
+const LIFT_MM = 0.1;
+
 /** What the brightest colour stands for, the same on all fingers. */
 export class Scale {
   sed = LEAST_SED;
+  /** @type {Map<Finger, number>} */ #now = new Map();
 
-  /** Grows at once, shrinks slowly. @param {number} sedMax J/m3 */
-  follow(sedMax) {
-    this.sed = Math.max(LEAST_SED, sedMax, 0.99 * this.sed);
+  /** Grows at once, shrinks slowly. @param {Finger} finger @param {number} sedMax of that finger now, J/m3 */
+  follow(finger, sedMax) {
+    this.#now.set(finger, sedMax);
+    this.sed = Math.max(LEAST_SED, ...this.#now.values(), 0.99 * this.sed);
   }
 }
 
@@ -172,9 +177,18 @@ export class Finger {
     return this.atlas.pressureMap(this.pressuresPa, this.map);
   }
 
-  /** Dents the drawn skin: what the finger's share of the penetration pushes back, along the skin's normal. */
+  /** How far each vertex has moved, x y z, mm, as the server found it; null: it does not. @type {Float32Array | null} */
+  movedMm = null;
+
+  /** Draws the skin as it gives way: as the server found it, or by springs, whose share of the penetration pushes it back along its normal. */
   dent() {
     const { array } = this.position;
+    if (this.movedMm) {
+      const { movedMm } = this;
+      for (let k = 0; k < array.length; k++) array[k] = this.restMm[k] + movedMm[k] + (k % 3 === 2 && movedMm[k] !== 0 ? LIFT_MM : 0);
+      this.position.needsUpdate = true;
+      return;
+    }
     const { normals } = this.atlas;
     for (let i = 0, k = 0; i < this.penetrationMm.length; i++, k += 3) {
       const back = this.penetrationMm[i] * this.foundation.fingerShare;
@@ -192,7 +206,7 @@ export class Finger {
     this.sedMax = sedMax;
     this.forceN = forceN;
     this.flags = flags;
-    this.scale.follow(sedMax);
+    this.scale.follow(this, sedMax);
     this.#paint(sed, this.scale.sed);
     this.arrow.show(touch);
   }

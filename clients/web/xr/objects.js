@@ -1,7 +1,8 @@
 // Objects to touch: each a mesh, a signed distance in its own frame (mm, y up, the origin in its middle), a stiffness, and
 // the shape that the server is told of.
 
-import { BoxGeometry, CapsuleGeometry, Color, Mesh, MeshLambertMaterial, SphereGeometry } from 'three';
+import { CapsuleGeometry, Color, Mesh, MeshLambertMaterial, SphereGeometry } from 'three';
+import { RoundedBoxGeometry } from 'three/addons/geometries/RoundedBoxGeometry.js';
 
 /**
  * @typedef {object} Touchable
@@ -53,8 +54,8 @@ export function makeObjects(mmToWorld) {
   const kinds = /** @type {const} */ ([
     ['hard ball', sphere(9), Infinity, new SphereGeometry(9, 40, 28), 0xb9c4cf, 9, ballShape(9)],
     ['soft ball', sphere(9), 4000, new SphereGeometry(9, 40, 28), 0x7fae6b, 9, ballShape(9)],
-    ['hard block', block(9, 6), Infinity, new BoxGeometry(18, 12, 18), 0xa9875f, 15, blockShape(9, 6)],
-    ['soft cushion', block(9, 6), 4000, new BoxGeometry(18, 12, 18), 0xc98fa8, 15, blockShape(9, 6)],
+    ['hard block', block(9, 6), Infinity, new RoundedBoxGeometry(18, 12, 18, 6, ROUND_MM), 0xa9875f, 15, blockShape(9, 6)],
+    ['soft cushion', block(9, 6), 4000, new RoundedBoxGeometry(18, 12, 18, 6, ROUND_MM), 0xc98fa8, 15, blockShape(9, 6)],
     ['thin bar', bar(2, 7), Infinity, capsule, 0x8a93a8, 10, barShape(2, 7)],
   ]);
   return kinds.map(([name, distanceMm, objectPaPerMm, geometry, colour, reachMm, shape], n) => {

@@ -85,6 +85,7 @@ export class Solved {
       )),
       fingers: fingers.map(() => ({})),
       answer_layout: 'vertices',
+      displacement: true,
       map: true,
     }).then((hand) => { this.session = hand; }, (error) => onstate(`refused: ${error.message}`));
     this.#onstate = onstate;
@@ -111,8 +112,6 @@ export class Solved {
         return;
       }
       this.#isTracked[number] = true;
-      // The drawn dent of soft objects is that of springs.
-      finger.press(Infinity);
       if (this.#busy[number]) return;
       this.#busy[number] = true;
       hand.touch(this.#objects.map((object) => this.#poseOf(object, finger)), { finger: number })
@@ -128,7 +127,8 @@ export class Solved {
   }
 
   /** @param {Finger} finger @param {import('../src/hand.js').HandAnswer} answer */
-  #feel(finger, { touch, vertices, outOfRange, unsettled }) {
+  #feel(finger, { touch, vertices, displacementMm, outOfRange, unsettled }) {
+    finger.movedMm = displacementMm;
     const values = /** @type {Float32Array} */ (vertices);
     finger.atlas.interface.raster.rasterise(values, this.#map);
     finger.feel(this.#map, values.reduce((a, b) => Math.max(a, b), 0), Math.hypot(...touch.forceN), touch, inWords({ outOfRange, unsettled }));
