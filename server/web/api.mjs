@@ -40,11 +40,11 @@ function operation(document_, method, path, said) {
   const box = element("details", { class: "operation" }, title);
   if (said.description) box.append(element("p", {}, said.description));
   if (said.parameters?.length) {
-    box.append(element("h4", {}, "Parameters"), table(["name", "in", "meaning"], said.parameters.map((p) =>
+    box.append(element("h3", {}, "Parameters"), table(["name", "in", "meaning"], said.parameters.map((p) =>
       [p.name, p.in + (p.required ? ", due" : ""), p.description ?? ""])));
   }
-  if (said.requestBody) box.append(element("h4", {}, "Body"), ...forms(document_, said.requestBody.content));
-  box.append(element("h4", {}, "Answers"));
+  if (said.requestBody) box.append(element("h3", {}, "Body"), ...forms(document_, said.requestBody.content));
+  box.append(element("h3", {}, "Answers"));
   for (const [status, answer] of Object.entries(said.responses)) {
     const { description, content } = resolve(document_, answer);
     box.append(element("p", {}, element("b", {}, status), ` ${description ?? ""}`), ...forms(document_, content));
@@ -57,7 +57,7 @@ function operation(document_, method, path, said) {
 }
 
 /** Shows the operations by tag, in the document's order. */
-function show(document_, main) {
+function show(document_, operations) {
   const groups = new Map();
   for (const [path, methods] of Object.entries(document_.paths)) {
     for (const [method, said] of Object.entries(methods)) {
@@ -66,17 +66,17 @@ function show(document_, main) {
       groups.get(tag).append(operation(document_, method, path, said));
     }
   }
-  main.replaceChildren(...groups.values());
+  operations.replaceChildren(...groups.values());
 }
 
 themeButton(document.getElementById("theme"));
 const about = document.getElementById("about");
-const main = document.getElementById("operations");
+const operations = document.getElementById("operations");
 try {
   const response = await fetch("openapi.json");
   if (!response.ok) throw new Error(`the server answered ${response.status}`);
   const said = await response.json();
-  show(said, main);
+  show(said, operations);
   about.replaceChildren(`${said.info.description} Version ${said.info.version}; as `,
     element("a", { href: "openapi.json" }, "openapi.json"), ".");
 } catch (error) {
@@ -84,5 +84,5 @@ try {
 }
 document.getElementById("find").addEventListener("input", ({ target }) => {
   const word = target.value.trim().toLowerCase();
-  for (const box of main.querySelectorAll(".operation")) box.hidden = !box.dataset.text.includes(word);
+  for (const box of operations.querySelectorAll(".operation")) box.hidden = !box.dataset.text.includes(word);
 });
