@@ -10,8 +10,8 @@ const RINGS = 14;
 const FOLLOWS_MM = 3;
 const END = { lengthMm: 12, steps: 4, narrows: 0.12 };
 /** Height of the nail's free edge, as a share of the finger's greatest. */
-const FREE_EDGE = 0.64;
-const NAIL = { fromMm: -0.5, toMm: 11.2, spanRad: 0.98, liftMm: 0.3, across: 22, along: 18, rounding: 3.2 };
+const FREE_EDGE = 0.58;
+const NAIL = { fromMm: 0.9, toMm: 11.2, spanRad: 0.98, liftMm: 0.3, across: 22, along: 18, rounding: 3.2 };
 
 /** How much narrower the finger is at x than at its widest. */
 const narrowing = (x) => (x >= TIP_MM ? 1 : Math.sqrt(Math.max(0, 1 - ((TIP_MM - x) / TIP_MM) ** 2)));
@@ -119,16 +119,18 @@ function closeBase(out, border, isBase, baseMm) {
     const factor = 1 - END.narrows * part ** 3;
     rings.push(ring.map(([, y, z]) => [baseMm + END.lengthMm * part, y * factor, middle[2] + (z - middle[2]) * factor]));
   }
-  const outward = ([, y, z]) => {
-    const n = [0, y / HALF_MM.across ** 2, (z - middle[2]) / HALF_MM.thick ** 2];
-    const length = Math.hypot(...n) || 1;
-    return n.map((c) => c / length);
-  };
+  // Outward, square to the ring: the patch's own normals at its edge are that too, so that no seam is seen.
+  const outward = ring.map((_, k) => {
+    const [before, after] = [ring.at(k - 1), ring[(k + 1) % ring.length]];
+    const [y, z] = [after[1] - before[1], after[2] - before[2]];
+    const length = Math.hypot(y, z) || 1;
+    return [0, z / length, -y / length];
+  });
   for (let step = 0; step < END.steps; step++) {
     for (let k = 0; k < ring.length; k++) {
       const l = (k + 1) % ring.length;
       const corners = [rings[step][k], rings[step][l], rings[step + 1][l], rings[step + 1][k]];
-      quad(out, corners, corners.map(outward));
+      quad(out, corners, [outward[k], outward[l], outward[l], outward[k]]);
     }
   }
   const last = rings.at(-1);
@@ -153,13 +155,17 @@ export function nailMesh() {
     const z = HALF_MM.thick * s * Math.sin(round) + liftMm;
     return [x, y, z];
   };
+  const normal = (i, j) => {
+    const [left, right, low, high] = [point(Math.max(0, i - 1), j), point(Math.min(across, i + 1), j), point(i, Math.max(0, j - 1)), point(i, Math.min(along, j + 1))];
+    const [d, e] = [[right, left], [high, low]].map(([to, from]) => to.map((c, axis) => c - from[axis]));
+    const n = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
+    const length = Math.hypot(...n);
+    return length > 1e-9 ? n.map((c) => (n[2] < 0 ? -c : c) / length) : [0, 0, 1];
+  };
   for (let j = 0; j < along; j++) {
     for (let i = 0; i < across; i++) {
-      const corners = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
-      const [d, e] = [corners[2], corners[3]].map((c, k) => c.map((x, axis) => x - corners[k === 0 ? 0 : 1][axis]));
-      const n = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
-      const length = (Math.hypot(...n) || 1) * (n[2] < 0 ? -1 : 1);
-      quad(out, corners, Array(4).fill(n.map((x) => x / length)));
+      const places = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+      quad(out, places.map((place) => point(...place)), places.map((place) => normal(...place)));
     }
   }
   return Float32Array.from(out);

@@ -52,8 +52,8 @@ function okLab(lightness, a, b) {
   ];
 }
 
-/** Blue (negative) through grey to red (positive). */
-function diverging() {
+/** Blue (negative) through grey to red (positive); the lightness goes from that of nothing to that of the ends. */
+function diverging(nothing, ends) {
   const table = new Uint8ClampedArray(4 * TABLE_LEN);
   const low = { a: -0.045, b: -0.15 };
   const high = { a: 0.17, b: 0.095 };
@@ -61,7 +61,7 @@ function diverging() {
     const t = (2 * i) / (TABLE_LEN - 1) - 1;
     const end = t < 0 ? low : high;
     const strength = Math.abs(t);
-    const rgb = okLab(0.95 - 0.43 * strength, end.a * strength, end.b * strength);
+    const rgb = okLab(nothing + (ends - nothing) * strength, end.a * strength, end.b * strength);
     table.set([...rgb, 255], 4 * i);
   }
   return table;
@@ -71,7 +71,8 @@ function diverging() {
 export const TABLES = {
   viridis: fromPolynomial(VIRIDIS),
   inferno: fromPolynomial(INFERNO),
-  diverging: diverging(),
+  diverging: diverging(0.95, 0.52),
+  divergingDark: diverging(0.3, 0.72),
 };
 
 const ROUND_STEPS = [1, 1.5, 2, 3, 4, 5, 6, 8];

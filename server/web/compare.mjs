@@ -1,10 +1,10 @@
-// The other way: a second model or contact method on the same contact, in a session of its own. A model
-// gets the very pressure that the first session found; a method gets the same pose.
+// The other way: a second model or contact method on the same press, in a session of its own. It gets the
+// same pose as the first one, so that its time and the error that it expects are of the whole way from
+// poses. Where the service has no contact model, both get the same map of pressure.
 
 import { MAP_LEN, Session, sessionUrl } from './protocol.mjs';
-import { median } from './effects.mjs';
+import { Times } from './times.mjs';
 
-const KEPT = 30;
 /** The second answer may take its time: the first session watches the server. */
 const SILENT_MS = 10000;
 
@@ -27,24 +27,22 @@ export class Comparison {
     this.onfault = onfault;
     this.session = null;
     this.with = '';
+    /** Whether its frames are poses. */
+    this.givesPoses = false;
     /** What the answer that is due is to be held against. */
     this.first = new Float32Array(MAP_LEN);
-    this.serverMs = [];
-    this.waits = false;
+    this.times = new Times();
   }
 
   get isOn() {
     return this.with !== '';
   }
 
-  get isMethod() {
-    return this.with.startsWith('method:');
-  }
-
   /** Compares with `tier:NAME` or `method:NAME` from now on; '' ends it. */
   choose(what, hello) {
     this.with = what;
-    this.serverMs = [];
+    this.givesPoses = hello.input === 'objects';
+    this.times.clear();
     if (what === '') {
       this.session?.close();
       this.session = null;
@@ -52,7 +50,7 @@ export class Comparison {
     }
     this.session ??= new Session(sessionUrl(), {
       onstate: () => {},
-      onready: () => { this.serverMs = []; },
+      onready: () => this.times.clear(),
       onanswer: (answer) => this.#answer(answer),
       onfault: (code, message) => this.onfault(message),
     }, SILENT_MS);
@@ -63,20 +61,14 @@ export class Comparison {
   offer(pressurePa, sedJPerM3, pose, nowMs) {
     const { session } = this;
     if (!session?.ready || session.inFlight) return;
-    const frame = this.isMethod ? session.poseFrame : session.mapFrame;
-    frame.values.set(this.isMethod ? pose : pressurePa);
+    const frame = this.givesPoses ? session.poseFrame : session.mapFrame;
+    frame.values.set(this.givesPoses ? pose : pressurePa);
     if (session.send(nowMs, frame)) this.first.set(sedJPerM3);
   }
 
   #answer(answer) {
     if (answer.status !== 'ok') return;
-    this.serverMs.push((answer.serverUs - answer.queueUs) / 1000);
-    if (this.serverMs.length > KEPT) this.serverMs.shift();
+    this.times.push(answer);
     this.onpair(this.first, answer.sedJPerM3, answer);
-  }
-
-  /** Median time in the server without waiting, ms. */
-  get medianMs() {
-    return median(this.serverMs);
   }
 }

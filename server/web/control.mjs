@@ -197,6 +197,11 @@ export class PressControl {
     this.down = this.inputs.keep.checked;
   }
 
+  /** Whether a thumb that may scroll has gone to the side, and so presses. */
+  #isSideways(event) {
+    return this.touching && !this.held && Math.abs(event.clientX - this.last.x) > SIDEWAYS_PX;
+  }
+
   #listenToPad(canvas) {
     const move = (event) => {
       const [u, v] = this.pad.pixelAt(event);
@@ -214,7 +219,7 @@ export class PressControl {
       move(event);
     });
     canvas.addEventListener('pointermove', (event) => {
-      if (this.touching && !this.held && Math.abs(event.clientX - this.last.x) > SIDEWAYS_PX) this.#begin(canvas, event);
+      if (this.#isSideways(event)) this.#begin(canvas, event);
       if (this.held) move(event);
     });
     canvas.addEventListener('pointerup', (event) => {
@@ -264,7 +269,10 @@ export class PressControl {
       this.last.x = event.clientX;
       this.last.y = event.clientY;
       const presses = event.button === 0 && document.body.dataset.mode === 'press' && this.finger.pick(event, this.hit);
-      if (presses) {
+      if (presses && event.pointerType === 'touch') {
+        // As on the map: a thumb may be about to scroll.
+        this.touching = true;
+      } else if (presses) {
         this.press.moveToHit(this.hit);
         this.#begin(canvas, event);
       } else {
@@ -274,9 +282,14 @@ export class PressControl {
       }
     });
     canvas.addEventListener('pointermove', (event) => this.#fingerMove(canvas, event));
+    canvas.addEventListener('pointerup', (event) => {
+      if (!this.touching || this.held || !this.finger.pick(event, this.hit)) return;
+      this.#begin(canvas, event);
+      this.press.moveToHit(this.hit);
+    });
     for (const end of ['pointerup', 'pointercancel']) {
       canvas.addEventListener(end, () => {
-        if (this.held) this.#end();
+        if (this.held || this.touching) this.#end();
         this.turning = false;
         canvas.classList.remove('turning');
       });
@@ -290,6 +303,7 @@ export class PressControl {
   }
 
   #fingerMove(canvas, event) {
+    if (this.#isSideways(event)) this.#begin(canvas, event);
     if (this.turning) {
       this.finger.orbit((event.clientX - this.last.x) * TURN_RAD_PER_PX, (event.clientY - this.last.y) * TURN_RAD_PER_PX);
       this.last.x = event.clientX;

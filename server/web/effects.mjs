@@ -2,9 +2,9 @@
 // of a frame goes. What is not switched on is not computed: the frame's own timings show it.
 
 import { digits } from './colour.mjs';
+import { Times, keep, median, msOf } from './times.mjs';
 import { EFFECTS } from './words.mjs';
 
-const WINDOW = 40;
 /** So many answers under new terms are compared with as many under the old ones. */
 const ENOUGH = 12;
 const REFRESH_MS = 300;
@@ -17,45 +17,23 @@ const GRID = [80, 101, 122, 143];
 const EXCLUDES = { relaxation: 'shear_energy', shear_energy: 'relaxation' };
 
 const byId = (id) => document.getElementById(id);
-const ms = (us) => (us > 0 && us < 10 ? '< 0.01' : (us / 1000).toFixed(us < 9995 ? 2 : 1));
 
-/** Median of the last values. */
-export function median(values) {
-  const sorted = Float64Array.from(values).sort();
-  return sorted.length ? sorted[Math.floor(sorted.length / 2)] : NaN;
-}
-
-/** The last answers' times under the same terms. */
+/** The last answers under the same terms. */
 class Recent {
   constructor() {
-    this.parts = { wait: [], solve: [], infer: [], rest: [] };
+    this.times = new Times();
     this.bytes = 0;
     this.peak = [];
   }
 
   push(answer, peak) {
-    const rest = answer.serverUs - answer.queueUs - answer.networkUs - answer.solveUs;
-    const values = { wait: answer.queueUs, solve: answer.solveUs, infer: answer.networkUs, rest: Math.max(0, rest) };
-    for (const [name, list] of Object.entries(this.parts)) {
-      list.push(values[name]);
-      if (list.length > WINDOW) list.shift();
-    }
-    this.peak.push(peak);
-    if (this.peak.length > WINDOW) this.peak.shift();
+    this.times.push(answer);
+    keep(this.peak, peak);
     this.bytes = answer.bytes;
   }
 
   get count() {
     return this.peak.length;
-  }
-
-  of(part) {
-    return median(this.parts[part]);
-  }
-
-  /** Time without waiting, us: what the work costs. */
-  get workUs() {
-    return this.of('solve') + this.of('infer') + this.of('rest');
   }
 }
 
@@ -110,10 +88,13 @@ export class EffectSwitches {
     term.className = 'term';
     term.dataset.tip = about;
     term.textContent = label;
+    // The tip beside the switch is seen; this is heard.
+    const heard = Object.assign(document.createElement('span'), { className: 'sr', id: `about-${name}`, textContent: about });
+    box.setAttribute('aria-describedby', heard.id);
     check.append(box, term);
-    head.append(check);
+    head.append(check, heard);
     row.append(head);
-    row.insertCell().textContent = costUs === null ? '–' : ms(costUs);
+    row.insertCell().textContent = costUs === null ? '–' : msOf(costUs);
     const now = row.insertCell();
     this.rows.set(name, { box, now });
     box.addEventListener('change', () => {
@@ -169,10 +150,12 @@ export class EffectSwitches {
     const { recent } = this;
     const rest = `${this.on.size === 0 ? REST.bare : REST.more} `;
     if (this.restWords.textContent !== rest) this.restWords.textContent = rest;
-    const whole = PARTS.reduce((sum, [name]) => sum + recent.of(name), 0) || 1;
+    const whole = PARTS.reduce((sum, [name]) => sum + recent.times.of(name), 0) || 1;
     PARTS.forEach(([name], k) => {
-      this.bars[k].style.width = `${(100 * recent.of(name)) / whole}%`;
-      this.keys[k].textContent = `${ms(recent.of(name))} ms`;
+      this.bars[k].style.width = `${(100 * recent.times.of(name)) / whole}%`;
+      this.keys[k].textContent = `${msOf(recent.times.of(name))} ms`;
+      // Where maps are given there is no contact to find.
+      this.keys[k].parentElement.hidden = name === 'solve' && recent.times.of(name) === 0;
     });
   }
 
@@ -213,9 +196,9 @@ export class EffectSwitches {
     const { recent, before } = this;
     const note = byId('effects-note');
     if (before && recent.count >= ENOUGH) {
-      const [was, is] = [before.workUs, recent.workUs];
+      const [was, is] = [before.times.workUs, recent.times.workUs];
       const peak = median(recent.peak) / median(before.peak) - 1;
-      const parts = [`${this.switched}: ${is >= was ? '+' : '−'}${ms(Math.abs(is - was))} ms a frame now (${ms(was)} to ${ms(is)})`];
+      const parts = [`${this.switched}: ${is >= was ? '+' : '−'}${msOf(Math.abs(is - was))} ms a frame now (${msOf(was)} to ${msOf(is)})`];
       if (Math.abs(peak) > 0.005) parts.push(`peak of SED ${peak > 0 ? '+' : '−'}${Math.abs(100 * peak).toFixed(1)} %`);
       if (recent.bytes !== before.bytes) parts.push(`an answer ${(before.bytes / 1024).toFixed(0)} to ${(recent.bytes / 1024).toFixed(0)} KiB`);
       this.said = `${parts.join('; ')}.`;

@@ -13,6 +13,8 @@ import { ARROW_FRAGMENT, BODY_FRAGMENT, BODY_VERTEX, GLASS_FRAGMENT, GLASS_VERTE
 
 const FIELD_OF_VIEW_RAD = 0.5;
 const PITCH_LIMIT_RAD = 1.5;
+/** The picture is centred so far behind the middle of the patch, since the finger goes on there. */
+const TOWARDS_BASE_MM = 2;
 // The glass stands this far off the skin: coplanar faces would flicker.
 const GLASS_OFFSET_MM = 0.06;
 const NAIL_GLOSS = 0.35;
@@ -45,7 +47,7 @@ export class FingerView {
     this.forceText = document.getElementById('finger-force');
     this.yaw = 0.5;
     this.pitch = 0.35;
-    this.zoom = 1.25;
+    this.zoom = 1.15;
     this.view = new Float32Array(16);
     this.projection = new Float32Array(16);
     this.model = new Float32Array(16);
@@ -275,7 +277,7 @@ export class FingerView {
     this.gl.bufferData(this.gl.ARRAY_BUFFER, mesh, this.gl.STATIC_DRAW);
   }
 
-  /** Centre and radius of the patch, for the camera. */
+  /** Centre, a little towards the base, and radius of the patch, for the camera. */
   #measure() {
     const p = this.atlas.skin.positionsMm;
     this.centre = [0, 0, 0];
@@ -287,6 +289,7 @@ export class FingerView {
       }
       this.centre[k] = (low + high) / 2;
     }
+    this.centre[0] += TOWARDS_BASE_MM;
     this.radius = 0;
     for (let i = 0; i < p.length; i += 3) {
       const r = Math.hypot(p[i] - this.centre[0], p[i + 1] - this.centre[1], p[i + 2] - this.centre[2]);

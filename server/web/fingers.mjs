@@ -3,10 +3,10 @@
 
 import { Hand } from './hand.js';
 import { poseOf } from './contact.mjs';
-import { median } from './effects.mjs';
 import { MapView } from './map.mjs';
 import { Press } from './press.mjs';
 import { Scale } from './scale.mjs';
+import { keep, median } from './times.mjs';
 import { flagsOf } from './words.mjs';
 
 /** As one sees the palm of one's own right hand. `share`: of the slider's depth, so that they differ. */
@@ -233,9 +233,8 @@ export class HandView {
       if (value) last = value;
     });
     if (!last) return;
-    const keep = (list, value) => { if (list.push(value) > KEPT) list.shift(); };
-    keep(this.rounds, nowMs - beganMs);
-    for (const { value } of outcomes) if (value) keep(this.serverMs, value.totalUs / 1000);
+    keep(this.rounds, nowMs - beganMs, KEPT);
+    for (const { value } of outcomes) if (value) keep(this.serverMs, value.totalUs / 1000, KEPT);
     this.count++;
     this.#say();
     this.answered(digits.reduce((sum, digit) => sum + digit.forceN, 0), Math.max(...digits.map((digit) => digit.view.peak)), median(this.serverMs));

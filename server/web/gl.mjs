@@ -72,13 +72,18 @@ in vec3 v_normal;
 in vec2 v_uv;
 out vec4 colour;
 
-void main() {
-  float value = texture(u_sed, v_uv / 224.0).r;
+/** Where a value lies on the scale, 0 to 1. */
+float place(float value) {
   float t = value / u_max;
   if (u_decades > 0.0) t = t > 0.0 ? 1.0 + log2(t) / (3.321928 * u_decades) : 0.0;
-  t = clamp(t, 0.0, 1.0);
+  return clamp(t, 0.0, 1.0);
+}
+
+void main() {
+  float t = place(texture(u_sed, v_uv / 224.0).r);
   vec3 painted = texture(u_table, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
-  float paint = value > u_floor ? clamp(t / 0.12, 0.0, 1.0) : 0.0;
+  // From the floor on colours fade in, as on the maps.
+  float paint = clamp((t - place(u_floor)) / 0.12, 0.0, 1.0);
   vec3 n = normalize(v_normal);
   vec3 eye = normalize(-v_view);
   // Seen from behind, as where the patch ends, it is skin as well.

@@ -6,10 +6,13 @@ import { TABLES, TABLE_LEN, digits } from './colour.mjs';
 import { Press } from './press.mjs';
 import { MAP_LEN, SIDE_PX, Session, sessionUrl } from './protocol.mjs';
 import { fetchJson } from './replay.mjs';
+import { fadeInto, groundOf } from './scale.mjs';
 import { flagsOf } from './words.mjs';
 
 const PATIENCE_MS = 30000;
 const KPA = 1000;
+/** Red, so that one such pixel is seen. */
+const NAN_COLOUR = 0xff0000ff;
 
 const byId = (id) => document.getElementById(id);
 
@@ -117,17 +120,18 @@ export function sendCase(hardCase, atlas, mostPa, tier) {
 
 /** One word for what came of a case, and a sentence. */
 export function verdictOf({ answer, problem, warnings }, mostPa) {
-  if (problem) return { kind: 'refused', text: `Refused: ${problem.code}`, more: problem.message };
+  if (problem) return { kind: 'refused', text: `Refused with the error ${problem.code}`, more: problem.message };
   const flags = flagsOf(answer, mostPa);
   const asked = warnings.map(({ question }) => question);
   if (answer.status !== 'ok') return { kind: 'refused', text: answer.status, more: '' };
   if (flags.length) return { kind: 'flagged', text: `Answered with a flag: ${flags.join('; ')}`, more: asked.join(' ') };
-  if (asked.length) return { kind: 'flagged', text: 'Answered with a question', more: asked.join(' ') };
+  if (asked.length) return { kind: 'flagged', text: 'Answered, with a question back', more: asked.join(' ') };
   if (answer.noContact) return { kind: 'plain', text: 'Nothing touches; all is zero', more: '' };
   return { kind: 'plain', text: 'Answered without a flag: nothing is known to be wrong', more: '' };
 }
 
-function picture(values, table, label) {
+/** A map as a small picture on the ground of its patch's `mask`, each on a scale of its own. */
+function picture(values, table, label, mask) {
   const figure = document.createElement('figure');
   const canvas = Object.assign(document.createElement('canvas'), { width: SIDE_PX, height: SIDE_PX });
   canvas.setAttribute('role', 'img');
@@ -135,9 +139,14 @@ function picture(values, table, label) {
   const context = canvas.getContext('2d');
   const image = context.createImageData(SIDE_PX, SIDE_PX);
   const words = new Uint32Array(image.data.buffer);
-  const colours = new Uint32Array(TABLES[table].buffer);
+  const bytes = new Uint8ClampedArray(4 * TABLE_LEN);
+  fadeInto(bytes, TABLES[table], groundOf(document.body), 0);
+  const colours = new Uint32Array(bytes.buffer);
   const most = values.reduce((a, b) => (b > a ? b : a), 0) || 1;
-  for (let i = 0; i < MAP_LEN; i++) words[i] = Number.isNaN(values[i]) ? 0xff0000ff : values[i] > 0 ? colours[Math.min(TABLE_LEN - 1, Math.floor((values[i] / most) * TABLE_LEN))] : 0;
+  for (let i = 0; i < MAP_LEN; i++) {
+    if (Number.isNaN(values[i])) words[i] = NAN_COLOUR;
+    else if (mask[i] || values[i] > 0) words[i] = colours[Math.max(0, Math.min(TABLE_LEN - 1, Math.floor((values[i] / most) * TABLE_LEN)))];
+  }
   context.putImageData(image, 0, 0);
   const caption = document.createElement('figcaption');
   caption.textContent = label;
@@ -185,8 +194,8 @@ export class HardCases {
     const pictures = document.createElement('div');
     pictures.className = 'pictures';
     const pressure = isMap ? frame : answer?.pressurePa;
-    if (pressure) pictures.append(picture(pressure, 'viridis', isMap ? 'pressure sent' : 'pressure found'));
-    if (answer?.sedJPerM3) pictures.append(picture(answer.sedJPerM3, 'inferno', 'SED answered'));
+    if (pressure) pictures.append(picture(pressure, 'viridis', isMap ? 'pressure sent' : 'pressure found', this.atlas.skin.raster.mask));
+    if (answer?.sedJPerM3) pictures.append(picture(answer.sedJPerM3, 'inferno', 'SED answered', this.atlas.interface.raster.mask));
     const list = document.createElement('dl');
     const line = (name, text, kind = '') => {
       if (!text) return;
@@ -226,7 +235,7 @@ function feCase({ name, about, variants }) {
   const box = document.createElement('details');
   const head = document.createElement('summary');
   const code = document.createElement('b');
-  code.textContent = name;
+  code.textContent = `${name[0].toUpperCase()}${name.slice(1).replaceAll('-', ' ')}:`;
   const count = (word) => variants.filter(([, end]) => end === word).length;
   const counts = ['converged', 'evaluated', 'refused'].map((word) => [count(word), word]).filter(([n]) => n > 0);
   head.append(code, ` ${counts.map(([n, word]) => `${n} ${word}`).join(', ')}`);

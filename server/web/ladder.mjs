@@ -12,7 +12,7 @@ const DOT_PX = 5;
 /** Least distance of two numbers on the time axis. */
 const TICK_PX = 46;
 const KINDS = {
-  closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'published U-Net', fe: 'FE',
+  closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'published U-Net', fe: 'finite elements (FE)',
 };
 
 const byId = (id) => document.getElementById(id);
@@ -130,6 +130,13 @@ function optionOf(tier, text, value, given) {
   return option;
 }
 
+/** Choices of tiers: those that learnt what is given, then a group of the others. */
+function choicesOf(tiers, given, option) {
+  const others = Object.assign(document.createElement('optgroup'), { label: nameOfOthers(given) });
+  others.append(...tiers.filter((tier) => !suits(tier, given)).map(option));
+  return [...tiers.filter((tier) => suits(tier, given)).map(option), ...(others.childElementCount > 0 ? [others] : [])];
+}
+
 /** The tiers as the choices of the model, each with its error from what is given; first those that learnt it. */
 export function offerTiers({ tiers }, given) {
   const select = byId('tier');
@@ -141,9 +148,7 @@ export function offerTiers({ tiers }, given) {
     const error = errorFrom(tier, given);
     return optionOf(tier, `${nameOfTier(tier.name)} (${ms}${error > 0 ? `, ${oneDigit(100 * error)} % off` : ''})`, tier.name, given);
   };
-  const others = Object.assign(document.createElement('optgroup'), { label: nameOfOthers(given) });
-  others.append(...tiers.filter((tier) => !suits(tier, given)).map(option));
-  select.replaceChildren(byBudget, ...tiers.filter((tier) => suits(tier, given)).map(option), ...(others.childElementCount > 0 ? [others] : []));
+  select.replaceChildren(byBudget, ...choicesOf(tiers, given, option));
   select.value = chosen;
 }
 
@@ -152,7 +157,7 @@ export async function listTiers() {
   const listing = await fetchJson('v1/tiers');
   const given = listing.methods === null ? 'pressure' : 'poses';
   offerTiers(listing, given);
-  byId('with').append(...listing.tiers.map((tier) => optionOf(tier, nameOfTier(tier.name), `tier:${tier.name}`, given)));
+  byId('with').append(...choicesOf(listing.tiers, given, (tier) => optionOf(tier, nameOfTier(tier.name), `tier:${tier.name}`, given)));
   for (const method of listing.methods ?? []) {
     const name = nameOfMethod(method.name);
     const option = new Option(`${name} (${oneDigit(method.contact_us / 1000)} ms)`, method.name);

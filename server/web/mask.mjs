@@ -36,3 +36,19 @@ function neighbourInside(mask, row, column) {
   }
   return -1;
 }
+
+/** In words, where the masks of this atlas differ from the server's own pictures of them. */
+export async function differencesFromServer(atlas) {
+  const words = [];
+  for (const patch of ['skin', 'interface']) {
+    const response = await fetch(`v1/atlas/mask.png?patch=${patch}`);
+    if (!response.ok) throw new Error(`v1/atlas/mask.png: HTTP ${response.status}`);
+    const image = await createImageBitmap(await response.blob(), { colorSpaceConversion: 'none' });
+    // Read on the processor: a graphics processor that draws the finger would be waited for.
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d', { willReadFrequently: true });
+    context.drawImage(image, 0, 0);
+    const differing = countDifferences(atlas[patch].raster.mask, context.getImageData(0, 0, image.width, image.height).data);
+    if (differing > 0) words.push(`${differing} pixels of the ${patch} mask differ from the server's`);
+  }
+  return words;
+}

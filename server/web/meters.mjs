@@ -111,7 +111,6 @@ export class Meters {
     put('tier-name', nameOfTier(this.tier));
     byId('tier-name').dataset.tier = this.tier;
     put('sed-of', nameOfTier(this.tier));
-    put('sed-ms', this.serverMs > 0 ? `${ms(this.serverMs)} ms in the server` : '–');
     put('rate', sending ? `${stats.rate(nowMs)} frames/s` : 'idle');
     for (const [name, ring] of [['trip', stats.roundTripMs], ['server', stats.serverMs]]) {
       ring.percentiles(pair);

@@ -1,41 +1,35 @@
 // The page: wires atlas, press, sessions, maps and figures together. One loop, driven by the display.
 
 import { Atlas } from './atlas.mjs';
-import { Comparison, relativeL2 } from './compare.mjs';
+import { Comparison } from './compare.mjs';
 import { Contact, poseOf, readTouch } from './contact.mjs';
 import { PressControl } from './control.mjs';
 import { rms } from './colour.mjs';
 import { EffectSwitches } from './effects.mjs';
-import { FingerView } from './finger.mjs';
+import { listenToMeshes, listenToShare } from './files.mjs';
 import { HandView } from './fingers.mjs';
 import { HardCases } from './hard.mjs';
 import { LadderView, adviseTier, listTiers, offerTiers } from './ladder.mjs';
-import { MapView } from './map.mjs';
-import { countDifferences } from './mask.mjs';
-import { meshOf } from './mesh.mjs';
+import { differencesFromServer } from './mask.mjs';
 import { Meters } from './meters.mjs';
+import { byId, forgetNotice, notify, put, showFlags, showState } from './notice.mjs';
+import { Pictures, equal } from './pictures.mjs';
 import { Press } from './press.mjs';
 import { MAP_LEN, SIDE_PX, Session, sessionUrl } from './protocol.mjs';
 import { Replay, fetchJson } from './replay.mjs';
-import { LOG_DECADES, Scale } from './scale.mjs';
-import { hashOf, npyOf, pictureOf, pythonOf, save, stateOf } from './share.mjs';
+import { hashOf, npyOf, pictureOf, pythonOf, stateOf } from './share.mjs';
 import { SpikeView } from './spikes.mjs';
-import { SureBar } from './sure.mjs';
 import { themeButton } from './theme.mjs';
 import { choosable, defaultFor, suits, tierAfter, tierFor } from './tiers.mjs';
 import { Timeline } from './timeline.mjs';
-import { flagsOf, nameOfMethod, nameOfTier, notLearnt } from './words.mjs';
+import { flagsOf, nameOfMethod, nameOfOthers, nameOfTier, notLearnt } from './words.mjs';
 
-const byId = (id) => document.getElementById(id);
-/** A complaint stays at least this long, then until frames are answered again. */
-const NOTICE_MS = 6000;
 /** A frame is sent so often even if nothing changes, so that a silent server is noticed. */
 const QUIET_MS = 1000;
-const SED_UNIT = 'J/m³';
-/** A dropped file whose size could be a finger's keeps it. */
-const PLAUSIBLE_MM = { least: 3, most: 30 };
-/** What the second answer is without, if the first has it: it is asked of the pressure, or of the pose, alone. */
-const LACKS = { shear_energy: 'without shear', relaxation: 'without creep' };
+/** Flags lie at the foot of a map, unless a press is lower than this. */
+const LOW_PX = 0.7 * SIDE_PX;
+/** Effects that change SED itself: the second answer has them too, and of no such answer is an error stated. */
+const CHANGES_SED = ['shear_energy', 'relaxation'];
 /** What the friction of the switch is, where none was chosen. */
 const FRICTION = 0.5;
 /** What a link says where the budget chooses the model; one that says nothing leads to the service's default. */
@@ -63,18 +57,15 @@ class Page {
     /** What is on its way: its kind, pressure (as far as the page knows it), pose, and what was pressed. */
     this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN), pose: new Float32Array(7), pressed: null };
     this.answered = { sequence: 0, tier: '', pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
-    this.pair = { of: '', first: new Float32Array(MAP_LEN), second: new Float32Array(MAP_LEN), difference: new Float32Array(MAP_LEN), apart: NaN };
-    /** How far each vertex of the skin has moved, as it is drawn. */
-    this.movedMm = new Float32Array(3 * atlas.vertexCount);
     this.meters = new Meters((tier, budgetMs) => this.#advice(tier, budgetMs).text);
     this.replay = new Replay(atlas);
     this.spikes = new SpikeView();
-    this.sure = { sed: new SureBar(byId('sed-sure')), other: new SureBar(byId('other-sure')) };
     this.timeline = new Timeline();
-    this.#makeViews();
-    this.control = new PressControl(atlas, this.press, this.views.pressure);
-    if (this.finger) this.control.attachFinger(this.finger);
-    if (this.contact) this.contact.draws = this.finger !== null;
+    this.pictures = new Pictures(atlas);
+    const { views, finger } = this.pictures;
+    this.control = new PressControl(atlas, this.press, views.pressure);
+    if (finger) this.control.attachFinger(finger);
+    if (this.contact) this.contact.draws = finger !== null;
     this.effects = new EffectSwitches(effects, (name, on) => this.#effect(name, on));
     this.comparison = new Comparison((first, second, answer) => this.#showPair(first, second, answer), (message) => notify(message));
     this.hard = new HardCases(atlas, this.contact !== null, (given) => this.#listed(tierFor(listing, this.answered.tier, given)));
@@ -84,35 +75,14 @@ class Page {
       told: (ready) => this.#handReady(ready),
       notify: (message) => notify(message),
       answered: (forceN, sedPeak, serverMs) => {
-        if (nowOf() - noticedAtMs > NOTICE_MS) notify('');
-        this.timeline.add(nowOf(), forceN, sedPeak, NaN, null, serverMs);
+        forgetNotice();
+        this.timeline.add(performance.now(), forceN, sedPeak, NaN, null, serverMs);
         this.ladder.showLive(serverMs, NaN);
       },
     });
     this.#listen();
     this.#restore();
     this.tick = (nowMs) => this.#frame(nowMs);
-  }
-
-  #makeViews() {
-    const { atlas } = this;
-    this.scales = {
-      pressure: new Scale(byId('pressure-scale'), { table: 'viridis', unit: 'Pa', least: 1000 }),
-      sed: new Scale(byId('sed-scale'), { table: 'inferno', unit: SED_UNIT, least: 1 }),
-    };
-    this.scales.difference = new Scale(byId('difference-scale'), { table: 'diverging', unit: SED_UNIT, least: 1, signed: true, like: this.scales.sed });
-    const view = (id, scale) => new MapView(byId(id), this.scales[scale]);
-    this.views = { pressure: view('pressure', 'pressure'), sed: view('sed', 'sed'), other: view('other', 'sed'), difference: view('difference', 'difference') };
-    this.views.pressure.setPatch(atlas.skin.raster, atlas.mmPerPx);
-    for (const name of ['sed', 'other', 'difference']) this.views[name].setPatch(atlas.interface.raster, atlas.mmPerPx);
-    try {
-      this.finger = new FingerView(byId('finger'), atlas);
-    } catch (error) {
-      this.finger = null;
-      byId('no-webgl').hidden = false;
-      byId('no-webgl').textContent = `The 3-D finger cannot be drawn: ${error.message}. The maps work without it.`;
-    }
-    this.scales.sed.onchange = () => this.#paintFinger();
   }
 
   #makeSession() {
@@ -235,6 +205,8 @@ class Page {
     this.replay.forget();
     this.meters.ready(ready, this.ladder.medians(ready.tier));
     this.#noteBudget(ready);
+    // The second answer is of the same indenter and, but for what is compared, found in the same way.
+    if (this.comparison.isOn) this.#chooseOther();
     notify('');
   }
 
@@ -273,16 +245,17 @@ class Page {
       document.body.dataset.live = '';
       this.hard.begin();
     }
-    if (nowMs - noticedAtMs > NOTICE_MS) notify('');
+    forgetNotice();
     this.#followTier(answer.tierNumber);
     showFlags('flags', flagsOf(answer, this.mostPa));
+    for (const id of ['flags', 'other-flags']) byId(id).dataset.at = this.mode === 'press' && this.press.uvPx[1] > LOW_PX ? 'top' : 'bottom';
     const touch = answer.touch ? readTouch(answer.touch) : null;
     // Where nothing touches there is nothing to be wrong.
-    if (this.mode === 'press') this.sure.sed.show(answer.noContact ? null : answer.errorEstimate);
+    if (this.mode === 'press') this.pictures.sure.sed.show(answer.noContact ? null : answer.errorEstimate, NaN, this.#whyUnknown(this.session.ready?.tier));
     if (touch) this.meters.press(touch);
     if (this.mode === 'press') {
-      this.finger?.setForce(touch);
-      this.#moveSkin(answer.displacementMm);
+      this.pictures.finger?.setForce(touch);
+      this.pictures.moveSkin(answer.displacementMm, this.press);
     }
     if (answer.spikes) this.spikes.show(answer.spikes, answer.timeMs, this.press.uvPx);
     this.answered.sequence = answer.sequence;
@@ -295,22 +268,13 @@ class Page {
       this.#showMaps(nowMs);
       this.repaint = false;
     }
-    this.effects.answer(answer, this.views.sed.peak, nowMs);
+    this.effects.answer(answer, this.pictures.views.sed.peak, nowMs);
+    put('sed-ms', this.effects.recent.times.words);
     const forceN = touch?.forceN ?? (this.sent.mode === 'press' ? this.press.forceN : NaN);
     const rateHz = answer.ratesHz ? answer.ratesHz.reduce((a, b) => Math.max(a, b), 0) : NaN;
-    this.timeline.add(nowMs, forceN, this.views.sed.peak, rateHz, this.sent.pressed, answer.serverUs / 1000);
+    this.timeline.add(nowMs, forceN, this.pictures.views.sed.peak, rateHz, this.sent.pressed, answer.serverUs / 1000);
     if (this.sent.mode === 'replay' && this.mode === 'replay' && this.replay.sent >= 0) this.#showErrors(nowMs, answer.errorEstimate);
     else if (this.sent.mode === 'press' && this.mode === 'press') this.comparison.offer(this.answered.pressurePa, this.answered.sedJPerM3, this.sent.pose, nowMs);
-  }
-
-  /** Draws the skin as the service moved it; a press that stands still is not drawn again. */
-  #moveSkin(movedMm) {
-    if (!this.finger || (movedMm && this.finger.isMoved && equal(movedMm, this.movedMm))) return;
-    if (movedMm) this.movedMm.set(movedMm);
-    const was = this.finger.isMoved;
-    const most = this.finger.setDisplacement(movedMm);
-    if (was && !movedMm) this.finger.setPress(this.press);
-    put('moved', Number.isNaN(most) ? '–' : `${most.toFixed(2)} mm`);
   }
 
   /** The budget may go on with another tier while the session lasts. */
@@ -324,70 +288,53 @@ class Page {
     this.replay.forget();
     this.effects.forget();
     this.repaint = true;
+    if (this.comparison.isOn) this.#chooseOther();
   }
 
   #showMaps(nowMs) {
-    const { pressure, sed } = this.views;
-    const { atlas, session, answered, scales } = this;
+    const { atlas, session, answered } = this;
+    const { scales } = this.pictures;
     // What a model or method gets wrong by on the whole map hides what is smaller than that.
     const [off] = [this.ladder.medians(answered.tier).find(([set]) => set === byId('ladder-set').value)?.[1] ?? 0];
     scales.sed.setFloor(off * rms(answered.sedJPerM3, atlas.interface.raster.pixels), `the usual error of ${nameOfTier(answered.tier)}`);
     const found = session.ready?.expected_error?.pressure_relative_l2.median ?? 0;
     scales.pressure.setFloor(this.solves ? found * rms(answered.pressurePa, atlas.skin.raster.pixels) : 0, 'the usual error of the contact');
-    pressure.show(answered.pressurePa, nowMs);
-    sed.show(answered.sedJPerM3, nowMs);
-    this.#paintFinger();
-  }
-
-  #paintFinger() {
-    const { sed } = this.scales;
-    this.finger?.setSed(this.answered.sedJPerM3, sed.max, sed.logarithmic ? LOG_DECADES : 0, sed.floor);
+    this.pictures.showAnswered(answered, nowMs);
   }
 
   #showErrors(nowMs, estimate) {
-    const { other, difference } = this.views;
     this.meters.errors(this.replay.judge(this.answered.sedJPerM3), this.replay.errors, this.replay.sent);
-    other.show(this.replay.truth, nowMs);
-    difference.show(this.replay.difference, nowMs);
-    byId('other-ms').textContent = 'solved once, before';
-    this.sure.sed.show(estimate, this.replay.figures.relativeL2);
-    this.sure.other.show(null);
-    showFlags('other-flags', []);
-    byId('apart').textContent = `${(100 * this.replay.figures.relativeL2).toFixed(1)} % apart (relative L2)`;
+    this.pictures.showTruth(this.replay, estimate, nowMs);
   }
 
   /** Both answers are to one contact. */
   #showPair(first, second, answer) {
     if (this.mode !== 'press') return;
-    const { other, difference } = this.views;
-    const { pixels } = this.atlas.interface.raster;
-    this.sure.other.show(answer.noContact ? null : answer.errorEstimate);
-    const isSame = equal(first, this.pair.first) && equal(second, this.pair.second);
-    const lacks = ['shear_energy', 'relaxation'].filter((name) => this.effects.on.has(name)).map((name) => LACKS[name]);
-    put('other-ms', `${this.comparison.medianMs.toFixed(1)} ms, ${[this.comparison.isMethod ? 'contact and model' : 'model alone', ...lacks].join(', ')}`);
-    if (isSame && this.pair.of === this.comparison.with) return;
-    this.pair.of = this.comparison.with;
-    this.pair.first.set(first);
-    this.pair.second.set(second);
-    for (let n = 0; n < pixels.length; n++) this.pair.difference[pixels[n]] = first[pixels[n]] - second[pixels[n]];
-    this.pair.apart = relativeL2(first, second, pixels);
-    const nowMs = performance.now();
-    other.show(second, nowMs);
-    difference.show(this.pair.difference, nowMs);
-    showFlags('other-flags', flagsOf(answer, this.comparison.session?.ready?.pressure_max_pa));
-    put('apart', Number.isNaN(this.pair.apart) ? 'no SED' : `${(100 * this.pair.apart).toFixed(1)} % apart (relative L2)`);
+    const { ready } = this.comparison.session ?? {};
+    this.pictures.sure.other.show(answer.noContact ? null : answer.errorEstimate, NaN, this.#whyUnknown(ready?.tier));
+    put('other-ms', this.comparison.times.words);
+    this.pictures.showPair(first, second, this.comparison.with, answer, ready?.pressure_max_pa);
+  }
+
+  /** Why the service states no error for an answer of this tier, if it states none. */
+  #whyUnknown(name) {
+    const tier = this.#listed(name);
+    if (tier && !suits(tier, this.given)) return `unknown, as it ${nameOfOthers(this.given)}`;
+    const changed = CHANGES_SED.some((effect) => this.effects.on.has(effect)) || (this.solves && this.contact.friction > 0);
+    return changed ? 'unknown with friction or creep' : undefined;
   }
 
   /** Opens or ends the session of the other way. */
   #chooseOther() {
     const what = this.mode === 'press' ? byId('with').value : '';
     document.body.toggleAttribute('data-with', what !== '');
-    for (const name of ['other', 'difference']) this.views[name].isShown = what !== '' || this.mode === 'replay';
+    this.pictures.showSecond(what !== '' || this.mode === 'replay');
     const [kind, name] = what.split(':');
     const { atlas_hash: atlasHash } = this.#terms();
-    const hello = { atlas_hash: atlasHash, budget_us: 500000, error_estimate: true };
-    if (kind === 'tier') Object.assign(hello, { tier: name });
-    else if (kind === 'method') Object.assign(hello, { tier: byId('tier').value || this.answered.tier || null, ...this.contact.terms(name) });
+    const hello = { atlas_hash: atlasHash, budget_us: 500000, error_estimate: true, effects: CHANGES_SED.filter((effect) => this.effects.on.has(effect)) };
+    const { tier, method } = this.session.ready ?? { tier: byId('tier').value || null, method: this.contact?.method };
+    hello.tier = kind === 'tier' ? name : tier;
+    if (this.solves) Object.assign(hello, this.contact.terms(kind === 'method' ? name : method));
     this.comparison.choose(what, hello);
   }
 
@@ -423,7 +370,6 @@ class Page {
     }
     if (this.solves && this.session.ready && this.contact.isDue(nowMs)) {
       this.#hello(nowMs);
-      if (this.comparison.isMethod) this.#chooseOther();
     }
     const map = this.session.mapFrame.values;
     const changed = this.mode === 'press' ? this.#stepPress(nowMs, map) : this.#stepReplay(nowMs, map);
@@ -431,11 +377,10 @@ class Page {
       if (this.unsent && this.session.inFlight) this.meters.skip();
       this.unsent = true;
     }
-    for (const scale of Object.values(this.scales)) scale.fit(nowMs);
     const ready = this.mode === 'press' || this.replay.loaded;
     const isQuiet = nowMs - this.session.sentAtMs > QUIET_MS;
     if (ready && (this.unsent || this.stream.checked || isQuiet)) this.#send(nowMs, map);
-    this.finger?.draw();
+    this.pictures.fit(nowMs);
     this.timeline.draw(nowMs);
     if (this.meters.refresh(nowMs, this.unsent || this.stream.checked, this.session.ready !== null)) {
       const judged = this.mode === 'replay' && this.replay.judged;
@@ -468,8 +413,7 @@ class Page {
       return false;
     }
     press.evaluate(control.depthMm);
-    this.views.pressure.setMarker(press.uvPx);
-    this.finger?.setPress(press);
+    this.pictures.setPress(press);
     if (this.solves) {
       poseOf(press, control.depthMm, this.session.poseFrame.values);
       return true;
@@ -509,69 +453,21 @@ class Page {
       this.replay.choose(Number(byId('replay-press').value));
     });
     byId('replay-play').addEventListener('click', () => this.#play(!this.replay.playing));
-    this.#listenToFiles();
+    listenToMeshes((mesh, sizeMm) => this.control.takeMesh(mesh, sizeMm), notify, () => this.control.mesh !== undefined);
     this.#listenToShare();
   }
 
-  #listenToFiles() {
-    const take = async (file) => {
-      try {
-        const mesh = meshOf(await file.arrayBuffer(), file.name);
-        const size = mesh.sideMm >= PLAUSIBLE_MM.least && mesh.sideMm <= PLAUSIBLE_MM.most ? Number(mesh.sideMm.toFixed(2)) : 10;
-        this.control.takeMesh(mesh, size);
-        const kept = size === Number(mesh.sideMm.toFixed(2));
-        byId('mesh-note').textContent = `${file.name}: ${mesh.triangles.length} triangles; ${kept ? 'its own size' : `${mesh.sideMm.toPrecision(3)} mm in the file, made ${size} mm`}. Its +z presses.`;
-      } catch (error) {
-        notify(error.message);
-      }
-    };
-    const end = () => { delete document.body.dataset.dragging; };
-    document.addEventListener('dragover', (event) => {
-      event.preventDefault();
-      document.body.dataset.dragging = '';
-    });
-    document.addEventListener('dragleave', (event) => { if (!event.relatedTarget) end(); });
-    document.addEventListener('drop', (event) => {
-      event.preventDefault();
-      end();
-      if (event.dataTransfer.files.length) take(event.dataTransfer.files[0]);
-    });
-    byId('mesh-file').addEventListener('change', () => { if (byId('mesh-file').files.length) take(byId('mesh-file').files[0]); });
-    // The chip of one's own mesh asks for a file, unless there is one already.
-    document.querySelector('input[name=shape][value=mesh]').addEventListener('click', () => { if (!this.control.mesh) byId('mesh-file').click(); });
-  }
-
   #listenToShare() {
-    const say = (text) => { byId('share-note').textContent = text; };
-    const copy = async (text, what) => {
-      try {
-        await navigator.clipboard.writeText(text);
-        say(`${what} copied.`);
-      } catch {
-        // Without a secure origin a page may not write the clipboard: what it would hold is shown instead.
-        window.prompt(`${what}:`, text);
-      }
-    };
-    byId('copy-link').addEventListener('click', () => {
-      history.replaceState(null, '', hashOf(this.state));
-      copy(location.href, 'Link');
-    });
-    byId('copy-python').addEventListener('click', () => {
-      if (!this.contact) {
-        say('This server has no contact model: there is no pose to send.');
-        return;
-      }
-      const origin = new URL('.', document.baseURI).href.replace(/\/$/, '');
-      copy(pythonOf({ origin, terms: { ...this.#terms(), tier: this.tierOfPress || null, ...this.contact.terms(this.contact.method) }, pose: this.session.poseFrame.values }), 'Program');
-    });
-    byId('save-csv').addEventListener('click', () => save('papilla.csv', 'text/csv', this.timeline.csv()));
-    byId('save-npy').addEventListener('click', () => {
-      save('papilla.npy', 'application/octet-stream', npyOf([this.answered.pressurePa, this.answered.sedJPerM3], SIDE_PX));
-      say('papilla.npy: pressure (Pa) and SED (J/m³), 2 x 224 x 224.');
-    });
-    byId('save-png').addEventListener('click', () => {
-      const figures = ['pressure', 'sed', 'other', 'difference'].map(byId);
-      pictureOf(figures, this.finger?.canvas).toBlob((blob) => save('papilla.png', 'image/png', blob));
+    const origin = new URL('.', document.baseURI).href.replace(/\/$/, '');
+    listenToShare({
+      link: () => {
+        history.replaceState(null, '', hashOf(this.state));
+        return location.href;
+      },
+      python: () => this.contact && pythonOf({ origin, terms: { ...this.#terms(), tier: this.tierOfPress || null, ...this.contact.terms(this.contact.method) }, pose: this.session.poseFrame.values }),
+      csv: () => this.timeline.csv(),
+      npy: () => npyOf([this.answered.pressurePa, this.answered.sedJPerM3], SIDE_PX),
+      png: () => pictureOf(Object.values(this.pictures.views), this.pictures.finger?.canvas),
     });
   }
 
@@ -615,13 +511,11 @@ class Page {
     if (mode === 'replay' && this.effects.on.has('shear_energy')) this.effects.set('shear_energy', false);
     this.effects.forget();
     this.repaint = true;
-    this.pair.of = '';
+    this.pictures.pair.of = '';
     if (this.contact && mode !== 'hand') this.#open();
     this.#chooseOther();
     if (mode === 'replay') {
-      this.views.pressure.setMarker(null);
-      this.finger?.setPress(null);
-      this.finger?.setForce(null);
+      this.pictures.setPress(null);
       if (!this.replay.loaded) this.#loadPresses();
     }
   }
@@ -647,61 +541,22 @@ class Page {
   }
 }
 
-const nowOf = () => performance.now();
-
-/** A press that does not move is answered alike again and again: no reason to draw it again. */
-function equal(a, b) {
-  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
-  return true;
-}
-
-function put(id, text) {
-  if (byId(id).textContent !== text) byId(id).textContent = text;
-}
-
-function showState(state, detail) {
-  const words = { connecting: 'connecting', ready: 'connected', waiting: 'disconnected', refused: 'refused' };
-  byId('state').dataset.state = state;
-  byId('state-text').textContent = detail ? `${words[state]}: ${detail}` : words[state];
-}
-
-/** What a network says that has not learnt such a press. */
-function showFlags(id, words) {
-  const text = words.join('; ');
-  if (byId(id).dataset.said === text) return;
-  byId(id).dataset.said = text;
-  byId(id).replaceChildren(...words.map((word) => Object.assign(document.createElement('span'), { textContent: word })));
-  byId(id).hidden = text === '';
-}
-
-let noticedAtMs = Infinity;
-
-function notify(message) {
-  noticedAtMs = message === '' ? Infinity : performance.now();
-  byId('notice').textContent = message;
-  byId('notice').hidden = message === '';
-}
-
 /** Says on the page whether this raster equals the server's own mask, pixel by pixel. */
 async function checkMasks(atlas) {
-  const words = [];
-  for (const patch of ['skin', 'interface']) {
-    const response = await fetch(`v1/atlas/mask.png?patch=${patch}`);
-    if (!response.ok) throw new Error(`v1/atlas/mask.png: HTTP ${response.status}`);
-    const image = await createImageBitmap(await response.blob(), { colorSpaceConversion: 'none' });
-    // Read on the processor: a graphics processor that draws the finger would be waited for.
-    const context = new OffscreenCanvas(image.width, image.height).getContext('2d', { willReadFrequently: true });
-    context.drawImage(image, 0, 0);
-    const differing = countDifferences(atlas[patch].raster.mask, context.getImageData(0, 0, image.width, image.height).data);
-    if (differing > 0) words.push(`${differing} pixels of the ${patch} mask differ from the server's`);
-  }
+  const words = await differencesFromServer(atlas);
   byId('mask-check').textContent = words.length ? words.join(', ') : '(masks equal the server’s)';
   byId('mask-check').classList.toggle('bad', words.length > 0);
 }
 
 document.body.dataset.mode = 'press';
+// What is set seldom is folded away where the screen is small.
+const wide = matchMedia('(min-width: 1181px)');
+wide.addEventListener('change', () => { byId('more').open = wide.matches; });
+byId('more').open = wide.matches;
 document.querySelector('input[name=mode][value=press]').checked = true;
 themeButton(byId('theme'));
+// What is seen beside a term when it is pointed at is heard when it is reached.
+for (const term of document.querySelectorAll('.term[tabindex]')) term.setAttribute('aria-description', term.dataset.tip);
 try {
   const atlas = new Atlas(await fetchJson('v1/atlas'));
   byId('atlas-hash').textContent = atlas.hash.slice(0, 12);
@@ -711,11 +566,11 @@ try {
   globalThis.papilla = page;
   checkMasks(atlas).catch((error) => notify(error.message));
 } catch (error) {
-  showState('waiting', '');
-  byId('state').dataset.state = 'failed';
-  byId('state-text').textContent = error.status === 401 ? 'a token is due' : 'not working';
+  showState('failed', error.status === 401 ? 'a token is due' : 'not working');
   if (error.status === 401) {
+    document.body.dataset.locked = '';
     byId('token').hidden = false;
+    byId('token-text').focus();
   } else {
     notify(`${error.message}. Reload the page to try again.`);
     throw error;

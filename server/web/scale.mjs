@@ -1,7 +1,7 @@
 // One colour scale for all maps of one quantity, and its legend: bar, ticks, what is not drawn, a lock.
 
 import { AutoRange, TABLES, TABLE_LEN, prefixOf } from './colour.mjs';
-import { onTheme } from './theme.mjs';
+import { isDark, onTheme } from './theme.mjs';
 
 /** Decades that the logarithmic scale spans. */
 export const LOG_DECADES = 3;
@@ -11,12 +11,24 @@ const FADE = 0.12;
 
 const trim = (value) => String(Number(value.toPrecision(3)));
 
+/** Fades the colours of `table` in over a ground, from the place `from` of the scale on. */
+export function fadeInto(bytes, table, ground, from) {
+  for (let i = 0; i < TABLE_LEN; i++) {
+    const part = Math.min(1, Math.max(0, (i / (TABLE_LEN - 1) - from) / FADE));
+    for (let k = 0; k < 3; k++) bytes[4 * i + k] = ground[k] + (table[4 * i + k] - ground[k]) * part;
+    bytes[4 * i + 3] = 255;
+  }
+}
+
+/** Red, green and blue of the ground on which maps are drawn. */
+export const groundOf = (element) => getComputedStyle(element).getPropertyValue('--bare').trim().split(/\s+/).map(Number);
+
 export class Scale {
   /** `options`: table, unit, least (smallest end), signed (symmetric about 0), like (a scale whose unit prefix this one shares). */
   constructor(element, options) {
     const part = (name) => element.querySelector(`[data-part=${name}]`);
     this.options = options;
-    /** Colours of the scale over bare skin: they fade in, so that what is all but nothing does not stand out. */
+    /** Colours of the scale over bare skin. */
     this.bytes = new Uint8ClampedArray(TABLES[options.table]);
     this.colours = new Uint32Array(this.bytes.buffer);
     this.range = new AutoRange(options.least);
@@ -26,6 +38,7 @@ export class Scale {
     /** In words, whose it is. */
     this.floorOf = '';
     this.bare = 0;
+    this.baked = '';
     this.views = [];
     this.bar = part('bar');
     this.ticks = part('ticks');
@@ -53,6 +66,7 @@ export class Scale {
     this.floor = floor > 0 ? Number(floor.toPrecision(2)) : 0;
     this.floorOf = of;
     this.#writeFloor();
+    this.#bake();
   }
 
   /** Fits the scale to what its visible views show. To be called while nothing new comes, too: it shrinks late. */
@@ -65,6 +79,7 @@ export class Scale {
   }
 
   #redraw() {
+    this.#bake();
     this.#drawTicks();
     this.#writeFloor();
     for (const view of this.views) view.paint();
@@ -78,15 +93,30 @@ export class Scale {
   }
 
   #readTheme() {
-    const rgb = getComputedStyle(this.element).getPropertyValue('--bare').trim().split(/\s+/).map(Number);
+    const rgb = groundOf(this.element);
     this.bare = (255 << 24 | rgb[2] << 16 | rgb[1] << 8 | rgb[0]) >>> 0;
-    const table = TABLES[this.options.table];
-    for (let i = 0; i < TABLE_LEN && !this.options.signed; i++) {
-      const part = Math.min(1, i / (FADE * TABLE_LEN));
-      for (let k = 0; k < 3; k++) this.bytes[4 * i + k] = rgb[k] + (table[4 * i + k] - rgb[k]) * part;
-    }
-    this.#drawBar();
+    this.bareRgb = rgb;
+    this.baked = '';
     this.#redraw();
+  }
+
+  /** Where a value lies on the scale, 0 to 1 and below. */
+  #place(value) {
+    if (this.logarithmic) return value > 0 ? 1 + Math.log10(value / this.max) / LOG_DECADES : -Infinity;
+    return value / this.max;
+  }
+
+  /** Colours over bare skin: from the floor on they fade in, so that what is all but nothing does not stand out and has no ragged edge. */
+  #bake() {
+    const from = Math.max(0, this.#place(this.floor));
+    const wanted = `${from.toFixed(3)} ${isDark()}`;
+    if (this.baked === wanted) return;
+    this.baked = wanted;
+    const { signed, table: name } = this.options;
+    const table = TABLES[signed && isDark() ? `${name}Dark` : name];
+    if (signed) this.bytes.set(table);
+    else fadeInto(this.bytes, table, this.bareRgb, from);
+    this.#drawBar();
   }
 
   #drawBar() {
@@ -101,6 +131,14 @@ export class Scale {
     const [size, prefix] = this.prefix();
     const text = this.floor > 0 ? `below ${trim(this.floor / size)} ${prefix}${this.options.unit}, ${this.floorOf}, nothing is drawn` : '';
     if (this.floorText.textContent !== text) this.floorText.textContent = text;
+  }
+
+  /** The ends of the scale, in words. */
+  get ends() {
+    const [size, prefix] = this.prefix();
+    const most = `${trim(this.max / size)} ${prefix}${this.options.unit}`;
+    const least = this.options.signed ? `−${most}` : this.logarithmic ? `${trim(this.max / size / 10 ** LOG_DECADES)} ${prefix}${this.options.unit}` : '0';
+    return [least, this.options.signed ? most : `≥ ${most}`];
   }
 
   prefix() {

@@ -53,34 +53,46 @@ export function save(name, type, content) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-/** The shown maps side by side with their titles and peaks, as a canvas. */
-export function pictureOf(figures, finger) {
-  const [side, head, gap] = [336, 44, 16];
+/** Words of an element; of a choice in it only what is chosen. */
+function wordsOf(element) {
+  if (element.tagName === 'SELECT') return element.selectedOptions[0]?.textContent ?? '';
+  const parts = [...element.childNodes].map((node) => (node.nodeType === Node.TEXT_NODE ? node.textContent : node.checkVisibility?.() ? wordsOf(node) : ''));
+  return parts.join('').replace(/\s+/g, ' ').trim();
+}
+
+const PICTURE = { side: 336, head: 48, foot: 40, gap: 16 };
+
+/** The maps that are shown side by side, each with its title, peak and scale, and the finger, as a canvas. */
+export function pictureOf(views, finger) {
+  const { side, head, foot, gap } = PICTURE;
   const canvas = document.createElement('canvas');
-  const shown = figures.filter((figure) => figure.checkVisibility({ visibilityProperty: true }));
+  const shown = views.filter(({ canvas: map }) => map.checkVisibility());
   canvas.width = (shown.length + (finger ? 1 : 0)) * (side + gap) + gap;
-  canvas.height = side + head + 2 * gap;
+  canvas.height = side + head + foot + 2 * gap;
   const context = canvas.getContext('2d');
   const style = getComputedStyle(document.body);
   context.fillStyle = style.getPropertyValue('--panel');
   context.fillRect(0, 0, canvas.width, canvas.height);
   context.fillStyle = style.getPropertyValue('--ink');
-  const write = (title, text, x) => {
-    context.font = '600 16px system-ui, sans-serif';
-    context.fillText(title, x, gap + 14);
-    context.font = '14px system-ui, sans-serif';
-    context.fillText(text, x, gap + 34);
+  const write = (font, text, x, y, align = 'left') => {
+    context.font = `${font} system-ui, sans-serif`;
+    context.textAlign = align;
+    context.fillText(text, x, y);
   };
-  const words = (element) => element.innerText.replace(/\s+/g, ' ').trim();
-  shown.forEach((figure, k) => {
-    const x = gap + k * (side + gap);
-    write(figure.dataset.title ?? words(figure.querySelector('h2')), words(figure.querySelector('.peak')), x);
+  shown.forEach((view, k) => {
+    const [x, below] = [gap + k * (side + gap), gap + head + side];
+    write('600 16px', wordsOf(view.element.querySelector('h2')), x, gap + 14);
+    write('14px', wordsOf(view.element.querySelector('.peak')), x, gap + 34);
     context.imageSmoothingEnabled = false;
-    context.drawImage(figure.querySelector('[data-part=pixels]'), x, gap + head, side, side);
+    context.drawImage(view.canvas, x, gap + head, side, side);
+    context.drawImage(view.scale.bar, x, below + 10, side, 10);
+    const [least, most] = view.scale.ends;
+    write('13px', least, x, below + 36);
+    write('13px', most, x + side, below + 36, 'right');
   });
   if (finger) {
     const x = gap + shown.length * (side + gap);
-    write('Finger', '', x);
+    write('600 16px', 'Finger', x, gap + 14);
     const scale = Math.min(side / finger.width, side / finger.height);
     context.imageSmoothingEnabled = true;
     context.drawImage(finger, x, gap + head, finger.width * scale, finger.height * scale);

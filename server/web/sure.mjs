@@ -4,15 +4,16 @@
 /** Relative error at the end of the bar. */
 const END = 0.5;
 const WARN = 0.3;
+const UNKNOWN = 'unknown for such a press';
 
 const part = (error) => `${(100 * Math.min(1, error / END)).toFixed(1)}%`;
 const percent = (error) => `${(100 * error).toFixed(error < 0.0995 ? 1 : 0)} %`;
 
-/** In words; '' where the answer carries no estimate. */
-export function sureWords(estimate) {
+/** In words; '' where the answer carries no estimate. `unknown`: what is said where the service states no error. */
+export function sureWords(estimate, unknown = UNKNOWN) {
   if (!estimate) return '';
   const [typical, bound] = estimate;
-  if (!Number.isFinite(typical)) return 'expected error: unknown for such a press';
+  if (!Number.isFinite(typical)) return `expected error: ${unknown}`;
   const most = Number.isFinite(bound) ? `; 9 in 10 such answers below ${percent(bound)}` : '';
   return `expected error ${percent(typical)}${most}`;
 }
@@ -33,8 +34,8 @@ export class SureBar {
   }
 
   /** `estimate`: typical error and bound, of SED then of force; null: none came. `found`: the true error, NaN where nobody knows it. */
-  show(estimate, found = NaN) {
-    const words = sureWords(estimate);
+  show(estimate, found = NaN, unknown = UNKNOWN) {
+    const words = sureWords(estimate, unknown);
     const shown = found > 0 && words ? `${words}; found ${percent(found)}` : words;
     if (this.text.textContent === shown) return;
     this.text.textContent = shown;

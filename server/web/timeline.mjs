@@ -1,5 +1,6 @@
 // The last seconds as curves, and a recording of the press that can be sent again.
 
+import { roundUp } from './colour.mjs';
 import { onTheme } from './theme.mjs';
 
 const SPAN_MS = 10000;
@@ -114,35 +115,60 @@ export class Timeline {
       context.textAlign = s === 0 ? 'right' : s === 10 ? 'left' : 'center';
       context.fillText(s === 0 ? 'now' : `−${s} s`, width - (s / 10) * width, height - 2);
     }
-    SERIES.forEach((series, k) => this.#curve(context, series, k, nowMs, width, bottom));
+    // Each curve has a band of its own: side by side on one scale they would hide each other.
+    const shown = SERIES.map((series, k) => ({ ...series, k, ...this.#seen(k, nowMs) })).filter(({ latest, id, none = '–' }) => {
+      if (Number.isNaN(latest)) this.#say(id, none);
+      return !Number.isNaN(latest);
+    });
+    const bandPx = bottom / Math.max(1, shown.length);
+    shown.forEach((series, n) => {
+      const top = Math.max(series.least, roundUp(1.1 * series.most));
+      context.fillStyle = this.line;
+      context.fillRect(0, Math.round((n + 1) * bandPx), width, 1);
+      this.#curve(context, series.k, nowMs, { width, bottom: (n + 1) * bandPx - 2, perUnit: (bandPx - 6) / top });
+      context.fillStyle = this.ink;
+      context.textAlign = 'left';
+      context.fillText(`${Number(top.toPrecision(3))} ${series.unit}`, 3, n * bandPx + 11);
+      this.#say(series.id, `${series.latest.toFixed(series.digits)} ${series.unit}`);
+    });
   }
 
-  #curve(context, { id, unit, digits, least, none = '–' }, k, nowMs, width, bottom) {
-    const values = this.values[k];
-    let most = least;
-    for (let n = 0; n < KEPT; n++) if (nowMs - this.atMs[n] < SPAN_MS && values[n] > most) most = values[n];
+  #say(id, text) {
+    if (byId(id).textContent !== text) byId(id).textContent = text;
+  }
+
+  /** The greatest value of a series within the span, and the latest; NaN where there is none. */
+  #seen(k, nowMs) {
+    let [most, latest] = [NaN, NaN];
+    for (let n = 0; n < KEPT; n++) {
+      const at = (this.next + n) % KEPT;
+      const value = this.values[k][at];
+      if (!(nowMs - this.atMs[at] < SPAN_MS) || Number.isNaN(value)) continue;
+      most = most > value ? most : value;
+      latest = value;
+    }
+    return { most, latest };
+  }
+
+  #curve(context, k, nowMs, { width, bottom, perUnit }) {
     context.strokeStyle = this.colours[k];
     context.lineWidth = 1.5;
     context.beginPath();
     let pen = false;
-    let latest = NaN;
     for (let n = 0; n < KEPT; n++) {
       const at = (this.next + n) % KEPT;
       const ago = nowMs - this.atMs[at];
-      const value = values[at];
+      const value = this.values[k][at];
       if (!(ago < SPAN_MS) || Number.isNaN(value)) {
         pen = false;
         continue;
       }
-      const [x, y] = [width - (ago / SPAN_MS) * width, bottom - (value / most) * (bottom - 4)];
+      const [x, y] = [width - (ago / SPAN_MS) * width, bottom - value * perUnit];
       if (pen) context.lineTo(x, y);
       else context.moveTo(x, y);
       pen = true;
-      latest = value;
     }
     context.stroke();
-    const text = Number.isNaN(latest) ? none : `${latest.toFixed(digits)} ${unit} (top ${most.toFixed(digits)})`;
-    if (byId(id).textContent !== text) byId(id).textContent = text;
   }
 
   /** The recording, or else the last seconds, as a table. */

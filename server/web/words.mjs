@@ -29,7 +29,7 @@ export function aboutSet(sets, name) {
 
 const TIERS = {
   's1-base16': ['published U-Net', 'The network of the paper, trained on a flat plate alone; for comparison.'],
-  's1-base16-relative': ['published U-Net, scaled', 'The network of the paper on relative pressure; for comparison.'],
+  's1-base16-relative': ['U-Net, scaled', 'The network of the paper on relative pressure; for comparison.'],
   'half-space': ['half-space', 'A closed form for a flat elastic block: no network, and rough on a finger.'],
   'nano-maps': ['nano for maps', 'For sessions that give maps of pressure.'],
   'small-maps': ['small for maps', 'For sessions that give maps of pressure.'],
@@ -61,7 +61,7 @@ const METHODS = {
   pixels: ['pixels', 'Pressure is solved at every pixel: the most accurate.'],
   coarse_pixels: ['half the pixels', 'Pressure is solved at every second pixel.'],
   second_order: ['vertices', 'Pressure is solved at the vertices of the mesh, with large motions.'],
-  small_strain: ['vertices, small strain', 'As with vertices, for small motions alone.'],
+  small_strain: ['small strain', 'As with vertices, for small motions alone.'],
   springs: ['springs', 'The skin as springs side by side: fastest, and rough.'],
 };
 

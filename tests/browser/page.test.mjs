@@ -90,6 +90,14 @@ test('the page connects, shows an answered press and agrees with the server on t
   await keep('press-light');
 });
 
+test('the page is below 1 MB on the wire, all that it loads by itself together', async (context) => {
+  const loaded = await page.evaluate(() => performance.getEntries().filter(({ encodedBodySize: size }) => size > 0).map(({ name, encodedBodySize: size }) => [name, size]));
+  const bytes = loaded.reduce((sum, [, size]) => sum + size, 0);
+  context.diagnostic(`${loaded.length} files, ${(bytes / 1000).toFixed(0)} kB compressed`);
+  assert.ok(loaded.length > 20 && loaded.some(([name]) => name.endsWith('papilla.mjs')), `${loaded.length} files`);
+  assert.ok(bytes < 1e6, JSON.stringify(loaded));
+});
+
 test('without a contact model the page gives maps, and begins with the network that learnt such', async () => {
   const listing = await (await fetch(new URL('v1/tiers', BASE))).json();
   assert.equal(await page.locator('#tier').inputValue(), listing.default_for_pressure);
@@ -412,6 +420,20 @@ test('on a phone a swipe scrolls, a tap presses, and targets are as large as a t
   await touch('touchEnd');
   await phone.waitForFunction(() => window.scrollY > 100, undefined, { timeout: PATIENCE_MS });
   assert.equal(await phone.evaluate(() => globalThis.papilla.press.uvPx[1]), pressed, 'and nothing was pressed');
+  // The finger in 3-D is touched likewise.
+  await phone.locator('#finger').scrollIntoViewIfNeeded();
+  const skin = await phone.locator('#finger').boundingBox();
+  const [left, top] = [skin.x + 0.5 * skin.width, skin.y + 0.6 * skin.height];
+  const [scrolled, place] = await phone.evaluate(() => [window.scrollY, Array.from(globalThis.papilla.press.uvPx)]);
+  await touch('touchStart', { x: left, y: top });
+  for (let step = 1; step <= 15; step++) await touch('touchMove', { x: left, y: top - 10 * step });
+  await touch('touchEnd');
+  await phone.waitForFunction((from) => window.scrollY > from + 60, scrolled, { timeout: PATIENCE_MS });
+  assert.deepEqual(await phone.evaluate(() => Array.from(globalThis.papilla.press.uvPx)), place, 'a swipe over the finger presses nothing');
+  await phone.locator('#finger').scrollIntoViewIfNeeded();
+  const again = await phone.locator('#finger').boundingBox();
+  await phone.touchscreen.tap(again.x + 0.5 * again.width, again.y + 0.6 * again.height);
+  assert.notDeepEqual(await phone.evaluate(() => Array.from(globalThis.papilla.press.uvPx)), place, 'a tap on it does');
   await context.close();
 });
 

@@ -21,8 +21,8 @@ for (const { name, hash, viewport, scale, of, isDark } of PICTURES) {
   const page = await context.newPage();
   await page.goto(`${BASE}${hash}`, { timeout: PATIENCE_MS });
   await page.waitForFunction((count) => {
-    const { mode, hand, answered, pair } = globalThis.papilla ?? {};
-    return mode === 'hand' ? hand.count > count / 5 : answered?.sequence > count && pair.apart > 0;
+    const { mode, hand, answered, pictures } = globalThis.papilla ?? {};
+    return mode === 'hand' ? hand.count > count / 5 : answered?.sequence > count && pictures.pair.apart > 0;
   }, ANSWERS, { timeout: PATIENCE_MS });
   // The hint to drag has done its duty.
   await page.evaluate(() => { document.body.dataset.pressed = ''; });
