@@ -1,4 +1,4 @@
-"""The script of devices, clients/conformance/devices.json, as every client runs it: without a service, on a clock of its own."""
+"""The script of devices, clients/conformance/devices.json, as every client runs it: on a clock of its own, no service."""
 
 import json
 from pathlib import Path
