@@ -1,4 +1,4 @@
-"""The script of devices, clients/conformance/devices.json, as every client runs it: on a clock of its own, no service."""
+"""The script of devices, clients/conformance/devices.json, as every client runs it: on its own clock, no service."""
 
 import json
 from pathlib import Path
