@@ -56,7 +56,7 @@ class Page {
     this.stream = byId('stream');
     /** What is on its way: its kind, pressure (as far as the page knows it), pose, and what was pressed. */
     this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN), pose: new Float32Array(7), pressed: null };
-    this.answered = { sequence: 0, tier: '', pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
+    this.answered = { sequence: 0, tier: '', expected: NaN, pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
     this.meters = new Meters((tier, budgetMs) => this.#advice(tier, budgetMs).text);
     this.replay = new Replay(atlas);
     this.spikes = new SpikeView();
@@ -260,6 +260,8 @@ class Page {
     if (answer.spikes) this.spikes.show(answer.spikes, answer.timeMs, this.press.uvPx);
     this.answered.sequence = answer.sequence;
     this.answered.tier = this.session.ready?.tier;
+    const [expected] = answer.errorEstimate ?? [NaN];
+    this.answered.expected = Number.isFinite(expected) ? expected : NaN;
     // All pictures are of one frame: what was pressed, what was answered, what is true.
     const pressurePa = answer.pressurePa ?? this.sent.pressurePa;
     if (this.repaint || !equal(this.answered.sedJPerM3, answer.sedJPerM3) || !equal(this.answered.pressurePa, pressurePa)) {
@@ -294,9 +296,10 @@ class Page {
   #showMaps(nowMs) {
     const { atlas, session, answered } = this;
     const { scales } = this.pictures;
-    // What a model or method gets wrong by on the whole map hides what is smaller than that.
-    const [off] = [this.ladder.medians(answered.tier).find(([set]) => set === byId('ladder-set').value)?.[1] ?? 0];
-    scales.sed.setFloor(off * rms(answered.sedJPerM3, atlas.interface.raster.pixels), `the usual error of ${nameOfTier(answered.tier)}`);
+    // What an answer is likely to get wrong by on the whole map hides what is smaller than that.
+    const usual = this.ladder.medians(answered.tier).find(([set]) => set === byId('ladder-set').value)?.[1] ?? 0;
+    const [off, whose] = answered.expected > 0 ? [answered.expected, 'the error expected of the first answer'] : [usual, `the usual error of ${nameOfTier(answered.tier)}`];
+    scales.sed.setFloor(off * rms(answered.sedJPerM3, atlas.interface.raster.pixels), whose);
     const found = session.ready?.expected_error?.pressure_relative_l2.median ?? 0;
     scales.pressure.setFloor(this.solves ? found * rms(answered.pressurePa, atlas.skin.raster.pixels) : 0, 'the usual error of the contact');
     this.pictures.showAnswered(answered, nowMs);

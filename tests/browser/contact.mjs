@@ -167,6 +167,9 @@ test('an answer says how wrong it is likely to be, where that is known', async (
   await page.fill('#depth', '1');
   await settled();
   await said(/^expected error [\d.]+ %; 9 in 10 such answers below [\d.]+ %$/);
+  // What is smaller than that error is not drawn; where none is stated it is the network's usual one.
+  const floor = (pattern) => until((source) => new RegExp(source, 'u').test(document.querySelector('#sed-scale [data-part=floor]').textContent), pattern.source);
+  await floor(/^below [\d.]+ k?J\/m³, the error expected of the first answer, nothing is drawn$/);
   const [typical, bound, wide] = await page.evaluate(() => ['b', 'i', '.sure-bar'].map((name) => document.querySelector(`#sed-sure ${name}`).closest('.sure').querySelector(name).getBoundingClientRect().width));
   assert.ok(typical > 0 && typical < bound && bound <= wide, `${typical} ${bound} ${wide}`);
   await page.selectOption('#with', 'tier:pico');
@@ -175,6 +178,7 @@ test('an answer says how wrong it is likely to be, where that is known', async (
   await chooseRadio('shape', 'wedge');
   await page.fill('#depth', '2');
   await said(/^expected error: unknown for such a press$/);
+  await floor(/, the usual error of nano, nothing is drawn$/);
   await page.focus('#pad');
   await page.keyboard.press('Escape');
   await until(() => document.getElementById('sed-sure').hidden);
@@ -302,6 +306,27 @@ test('the second answer is found from poses as the first one is, and states the 
   await page.selectOption('#with', 'tier:small-maps');
   await until(() => /unknown, as it learnt maps of pressure$/.test(document.getElementById('other-sure').textContent));
   await page.selectOption('#with', '');
+  await page.selectOption('#tier', 'nano');
+  await settled();
+});
+
+test('a drag along the line of the ladder goes from model to model', async () => {
+  const plot = page.locator('#ladder-plot');
+  await plot.scrollIntoViewIfNeeded();
+  /** Where the models on the line lie, px of the page, from the fastest to the slowest. */
+  const rungs = await page.evaluate(() => {
+    const { ladder } = globalThis.papilla;
+    const { left, top } = document.getElementById('ladder-plot').getBoundingClientRect();
+    return ladder.rungs.filter((rung) => rung.tier !== null && rung.onServedFront).map((rung) => ({ tier: rung.tier, x: left + ladder.x(rung.timeMs), top: top + 4 }));
+  });
+  assert.ok(rungs.length > 1, JSON.stringify(rungs));
+  const [first, last] = [rungs[0], rungs.at(-1)];
+  await page.mouse.move(first.x, first.top);
+  await page.mouse.down();
+  await until((tier) => globalThis.papilla.session.ready?.tier === tier, first.tier);
+  await page.mouse.move(last.x, last.top, { steps: 6 });
+  await page.mouse.up();
+  await until((tier) => globalThis.papilla.session.ready?.tier === tier && document.getElementById('tier').value === tier, last.tier);
   await page.selectOption('#tier', 'nano');
   await settled();
 });
@@ -454,6 +479,23 @@ test('a press is recorded and sent again, and goes into files', async () => {
   await until(() => !globalThis.papilla.timeline.isPlaying && globalThis.papilla.control.depthMm === 1.5);
   assert.equal((await saved('save-npy')).subarray(1, 6).toString(), 'NUMPY');
   assert.equal((await saved('save-png')).subarray(1, 4).toString(), 'PNG');
+  // What stands in the picture: of a choice what is chosen, and the ends of each scale.
+  await page.selectOption('#with', 'tier:pico');
+  await until(() => globalThis.papilla.pictures.pair.of === 'tier:pico');
+  const words = await page.evaluate(async () => {
+    const { pictureOf } = await import('./share.mjs');
+    const [said, { fillText }] = [[], CanvasRenderingContext2D.prototype];
+    CanvasRenderingContext2D.prototype.fillText = function write(text, ...at) {
+      said.push(text);
+      return fillText.call(this, text, ...at);
+    };
+    pictureOf(Object.values(globalThis.papilla.pictures.views), null);
+    CanvasRenderingContext2D.prototype.fillText = fillText;
+    return said;
+  });
+  assert.ok(['Pressure', 'SED by nano', 'SED by pico', 'First − second'].every((title) => words.includes(title)), words.join('; '));
+  assert.equal(words.filter((word) => /^≥ [\d.]+ (kPa|J\/m³|kJ\/m³)$/.test(word)).length, 3, words.join('; '));
+  await page.selectOption('#with', '');
 });
 
 test('a link holds what is pressed and how it is computed', async () => {

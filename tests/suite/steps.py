@@ -293,7 +293,7 @@ def full() -> list[Step]:
             "$run --no-contact page npm --prefix tests/browser test --silent\n"
             "$run page npm --prefix tests/browser run contact --silent",
             after=("build", "node", "packages"),
-            tests_min=38,
+            tests_min=80,
         ),
     ]
 
