@@ -225,7 +225,7 @@ def full() -> list[Step]:
             f"{client} wheel",
             after=("build", "python"),
             tests_min=60,
-            installs="pip: maturin, numpy, websockets, pytest (40 MB)",
+            installs="pip: maturin, numpy, websockets, matplotlib, pytest (80 MB)",
         ),
         Step("client-cpp", "the C++ client", f"{client} cpp", ("build", "packages"), 33),
         Step("client-c", "the native library from C and C++", f"{client} c", ("build", "packages"), 20),

@@ -1,5 +1,9 @@
-"""A pressure of your own: what finite elements and a network say of it, and which fibres fire: felt.npz."""
+"""A pressure of your own: what finite elements and a network say of it, and which fibres fire.
 
+Needs Papilla's wheel, and no service. Writes felt.npz, spikes.npz and own_pressure.png (matplotlib).
+"""
+
+import matplotlib.pyplot as plt
 import numpy as np
 
 import papilla
@@ -24,3 +28,20 @@ trains = afferents.spikes(network * share**2, times_s, pressure_pa * share)
 print(f"{len(trains.unit)} spikes of {len(np.unique(trains.unit))} units")
 trains.save_npz("spikes.npz")
 np.savez("felt.npz", pressure_pa=pressure_pa, fe=state.sed_j_per_m3, network=network)
+
+figure, axes = plt.subplots(1, 4, figsize=(12, 3), layout="constrained", gridspec_kw={"width_ratios": (1, 1, 1, 1.1)})
+maps = (
+    ("pressure, kPa", pressure_pa, "magma"),
+    ("SED by a coarse mesh, kJ/m³", state.sed_j_per_m3, "viridis"),
+    ("SED by the network, kJ/m³", network, "viridis"),
+)
+for axis, (title, image, colours) in zip(axes, maps, strict=False):
+    figure.colorbar(axis.imshow(1e-3 * image[40:160, 50:170], cmap=colours), ax=axis, shrink=0.8)
+    axis.set(xticks=[], yticks=[])
+    axis.set_title(title, fontsize=9)
+for kind, colour in (("sa1", "tab:green"), ("ra", "tab:blue"), ("pc", "tab:orange")):
+    mine = trains.classes[trains.unit] == kind
+    axes[3].plot(1e-3 * trains.time_us[mine], trains.unit[mine], "|", color=colour, label=kind.upper())
+axes[3].set(xlabel="time, ms", ylabel="nerve fibre")
+axes[3].legend(fontsize=8)
+figure.savefig("own_pressure.png", dpi=110)

@@ -1,15 +1,18 @@
-"""A ball that goes down on a finger, and what pushes back.
+"""First touch: a ball that goes down on a finger, what pushes back, and what lies under the skin.
 
-python examples/touch.py [URL]
+Writes touch.png (matplotlib).
 """
 
-import sys
+import os
 
-from papilla import DEFAULT_URL, Session
+import matplotlib.pyplot as plt
 
+import papilla
+
+url = os.environ.get("PAPILLA_URL", papilla.DEFAULT_URL)
 ball = {"shape": {"shape": "sphere", "radius_mm": 10.0}}
-url = sys.argv[1] if len(sys.argv) > 1 else DEFAULT_URL
-with Session(url, input="objects", objects=[ball], map=False) as session:
+depths_mm, forces_n = [], []
+with papilla.Session(url, input="objects", objects=[ball], pressure="map") as session:
     for step in range(11):
         depth_mm = 0.1 * step
         # The pad's lowest point is at (11.25, 0, -6.53); a ball's origin is its centre.
@@ -19,3 +22,14 @@ with Session(url, input="objects", objects=[ball], map=False) as session:
             print(f"{depth_mm:.1f} mm: no force, the frame is {answer.status}")
             continue
         print(f"{depth_mm:.1f} mm: {answer.touch.force_n[2]:.3f} N on {answer.touch.area_mm2:.1f} mm2")
+        depths_mm.append(depth_mm)
+        forces_n.append(answer.touch.force_n[2])
+
+figure, axes = plt.subplots(1, 3, figsize=(10, 3.2), layout="constrained")
+axes[0].plot(depths_mm, forces_n, "o-")
+axes[0].set(xlabel="depth, mm", ylabel="force, N")
+maps = (("pressure on the skin, kPa", answer.pressure_pa, "magma"), ("SED under it, kJ/m³", answer.sed, "viridis"))
+for axis, (title, image, colours) in zip(axes[1:], maps, strict=True):
+    figure.colorbar(axis.imshow(1e-3 * image, cmap=colours), ax=axis, shrink=0.9)
+    axis.set(xticks=[], yticks=[], title=title)
+figure.savefig("touch.png", dpi=110)

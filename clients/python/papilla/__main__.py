@@ -31,7 +31,7 @@ the right as the finger points ahead with the nail up, z out of the nail.
     pitch_mm = 2.0
     centre_mm = [11.25, 0, -6.53]    # the lowest point of the pad
 
-Then, beside a running papilla-server:
+Then, beside a running papilla-server (or with --url local, where Papilla's wheel is installed):
 
     python -m papilla sense record.csv --sensor glove.toml --out result.nc --picture result.png
 
@@ -51,15 +51,20 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_TEACH,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    sense.add_argument("record", type=Path, help="CSV with a header, or NPZ with times_s and readings")
+    sense.add_argument("record", type=Path, help="CSV with a header, NPZ with times_s and readings, or a bag of ROS")
     sense.add_argument("--sensor", type=Path, required=True, metavar="TOML", help="what the sensor is and where")
     sense.add_argument("--out", type=Path, metavar="FILE", help="result: .nc, .npz, .csv or .nwb")
     sense.add_argument("--picture", type=Path, metavar="FILE", help="a picture of it: .png, .svg or .pdf")
     sense.add_argument("--spikes", action="store_true", help="simulated touch units and their spikes too")
     sense.add_argument("--no-maps", action="store_true", help="numbers alone; a map takes 0.2 MB a frame")
     sense.add_argument("--tier", help="model, as /v1/tiers lists them (default: the service's)")
-    sense.add_argument("--url", default=DEFAULT_URL, help="the service (default: %(default)s)")
+    sense.add_argument(
+        "--url",
+        default=DEFAULT_URL,
+        help="the service, or 'local' for none: this process computes (default: %(default)s)",
+    )
     sense.add_argument("--token", help="a token of the service's, if it asks for one")
+    sense.add_argument("--topic", help="topic of a bag of ROS that carries the readings")
     sense.add_argument("--rate-hz", type=float, help="frames a second, for a record without times")
     sense.add_argument("--json", action="store_true", help="print the summary as JSON")
     return parser
@@ -76,6 +81,8 @@ def _sense(options: argparse.Namespace) -> None:
     how = sensors.describe_record(options.sensor)
     if options.rate_hz is not None:
         how["rate_hz"] = options.rate_hz
+    if options.topic is not None:
+        how["topic"] = options.topic
     record = sensors.read_record(options.record, **how)
     sensor = sensors.describe(options.sensor, url=options.url, token=options.token)
     effects = ["summary", "afferents", *(["spikes"] if options.spikes else [])]

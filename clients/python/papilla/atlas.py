@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import urllib.parse
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -9,7 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .http import DEFAULT_URL, get_json
+from .errors import BadInput
+from .http import DEFAULT_URL, LOCAL, get_json
+from .model import folder
 from .wire import SIDE_PX, Map
 
 _REACH_MM = 5.0
@@ -55,7 +58,16 @@ class Atlas:
 
     @classmethod
     def load(cls, url: str = DEFAULT_URL, token: str | None = None, *, finger: str | None = None) -> Atlas:
-        """From a service, of its default finger or of `finger`, by name; raises Unreachable or Refused."""
+        """From a service, of its default finger or of `finger`, by name; raises Unreachable or Refused.
+
+        At the address `local` it is that of the wheel's models, or of $PAPILLA_MODELS; raises BadModels.
+        """
+        if url == LOCAL:
+            if finger is not None:
+                raise BadInput(
+                    "finger", "fingers have names at a service; give its folder to papilla.Finger(...).atlas()"
+                )
+            return cls(json.loads((folder(None) / "atlas.json").read_text()))
         query = "" if finger is None else "?" + urllib.parse.urlencode({"finger": finger})
         return cls(get_json(url, "/v1/atlas" + query, token))
 

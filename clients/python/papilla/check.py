@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -30,6 +31,17 @@ def numbers(values: ArrayLike, member: str) -> NDArray[Any]:
     if array.dtype.kind not in "fiu":
         raise BadInput(member, f"it is of type {array.dtype}; real numbers are due, such as np.float32")
     return array
+
+
+def number(value: Any, member: str, due: str) -> float:
+    """One finite number; `due` says which."""
+    try:
+        found = float(value) if isinstance(value, int | float | np.number) else math.nan
+    except (TypeError, ValueError, OverflowError):
+        found = math.nan
+    if not math.isfinite(found):
+        raise BadInput(member, f"{value!r}; {due} is due")
+    return found
 
 
 def samples(pressure_pa: ArrayLike, window: Window) -> Map:

@@ -18,6 +18,8 @@ from .errors import Refused, Unreachable
 from .wire import SIDE_PX, WHOLE, Map
 
 DEFAULT_URL: Final = "http://127.0.0.1:7224"
+LOCAL: Final = "local"
+"""In place of an address: no service, this process computes."""
 _NPY: Final = "application/x-npy"
 # No proxy of the environment between a VR engine and the service beside it.
 _OPENER: Final = urllib.request.build_opener(urllib.request.ProxyHandler({}))

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from numpy.typing import ArrayLike
 
 from .errors import BadInput
-from .http import DEFAULT_URL
+from .http import DEFAULT_URL, LOCAL
 from .send_series import Progress, Source, Terms, parts
 from .series import Series, joined
 from .sync import Session
+
+if TYPE_CHECKING:
+    from .calls import Calls
+    from .inprocess import LocalSession
 
 _LANES_MAX: Final = 4
 
@@ -45,18 +49,27 @@ def _rendered(
     hello: dict[str, Any],
 ) -> Iterator[Series]:
     hello = {"error_estimate": True, **hello}
-    with Session(url, token, **hello) as first:
+    with _opened(url, token, hello) as first:
         source = Source(frames, times, unit, Terms.of(hello, first.ready))
         if lanes is None:
             lanes = 1 if source.remembers else max(1, min(_LANES_MAX, os.cpu_count() or 1, source.count or _LANES_MAX))
         elif lanes < 1 or (lanes > 1 and source.remembers):
             raise BadInput("lanes", f"{lanes}; a series whose frames depend on those before goes over one")
-        others = [Session(url, token, **hello) for _ in range(lanes - 1)]
+        others = [_opened(url, token, hello, first) for _ in range(lanes - 1)]
         try:
             yield from parts([first, *others], source, source.count or 256 if chunk is None else chunk, progress)
         finally:
             for session in others:
                 session.close()
+
+
+def _opened(url: str, token: str | None, hello: dict[str, Any], like: Calls | None = None) -> Session | LocalSession:
+    """A session with a service, or, at the address `local`, in this process, which shares a network with another."""
+    if url != LOCAL:
+        return Session(url, token, **hello)
+    from .inprocess import LocalSession
+
+    return LocalSession(like.model if isinstance(like, LocalSession) else None, **hello)
 
 
 def render(
@@ -78,7 +91,8 @@ def render(
     rates have no part of motion, and relaxation and spikes are refused. `unit` is that of `frames`.
 
     Frames of pressure that do not depend on those before go over several connections at once (`lanes`);
-    all others go over one, in order, one at a time. The rest are members of the hello, as for `Session`;
+    all others go over one, in order, one at a time. `url="local"` needs no service: this process computes, with
+    `lanes` threads. The rest are members of the hello, as for `Session`;
     answers say how wrong they are likely to be, unless it is `error_estimate=False`.
 
     Raises BadInput before anything is sent, and FrameFailed for a frame without an answer.

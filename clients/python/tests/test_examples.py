@@ -25,6 +25,27 @@ def example(tmp_path, monkeypatch, url):
     return run
 
 
+def test_touch(example):
+    forces_n = example("touch")["forces_n"]
+    assert forces_n[0] == 0.0 and (np.diff(forces_n) > 0).all() and forces_n[-1] > 0.2
+
+
+def test_figure4(example):
+    found = example("figure4")
+    errors = [
+        found["error"](predicted, indentation.sed_j_per_m3)
+        for predicted, indentation in zip(found["predictions"], found["indentations"], strict=True)
+    ]
+    assert max(errors) < 0.3
+
+
+def test_spikes(example):
+    trains = example("spikes")["trains"]
+    # In each of the ten taps.
+    taps = np.histogram(trains.time_us, np.arange(0, 1_100_000, 100_000))[0]
+    assert (taps > 20).all() and trains.lost == 0
+
+
 def test_series(example, tmp_path):
     found = example("series")
     assert (tmp_path / "series.csv").is_file() and (tmp_path / "series.nc").is_file()

@@ -86,6 +86,31 @@ def test_a_finer_sensor_comes_nearer_and_the_smooth_field_beats_steps(atlas):
     assert errors[0] < errors[1] < errors[2]
 
 
+def test_what_touches_sharpens_the_map(atlas):
+    # A press whose rim is much finer than the taxels; what is known of it is its shape, not its force.
+    place = np.array([11.25, 0.0, -6.53])
+    inside = np.linalg.norm(atlas.places_mm - place, axis=1)
+    truth = np.zeros(224 * 224)
+    truth[atlas.pixels[inside < 2.0]] = 2e4
+    truth = truth.reshape(224, 224)
+    sensor = Taxels.grid(8, 7, pitch_mm=2.0, atlas=atlas, noise=0.05)
+    rng = np.random.default_rng(2)
+    readings = np.nan_to_num(sensor.read(np.stack([truth, 0.4 * truth]), rng))
+
+    def error(maps):
+        return max(np.linalg.norm(maps[i] - s * truth) / np.linalg.norm(s * truth) for i, s in enumerate((1, 0.4)))
+
+    plain, known = sensor.pressure(readings), sensor.pressure(readings, prior=7 * truth)
+    assert error(known) < 0.1 < 0.4 < error(plain)
+    # A wrong prior does not override the readings, and one of nothing changes nothing.
+    beside = np.roll(truth, 25, axis=1)
+    assert sensor.reproduction(readings, sensor.pressure(readings, prior=beside)).max() < 0.05
+    assert np.array_equal(sensor.pressure(readings, prior=0 * truth), plain)
+    for bad, words in ((truth[:8], "shape"), (-truth, "never pulled"), (np.stack([truth] * 3), "is due")):
+        with pytest.raises(papilla.BadInput, match=words):
+            sensor.pressure(readings, prior=bad)
+
+
 def test_noise_without_a_touch_is_nothing(atlas, grid):
     rng = np.random.default_rng(1)
     readings = grid.read(np.zeros((20, 224, 224)), rng)
@@ -117,9 +142,71 @@ def test_a_list_of_taxels_lies_where_it_is_said_to(atlas):
     assert np.hypot(own % 224 + 0.5 - 112.0, own // 224 + 0.5 - 100.0).max() < 8
 
 
+def test_a_wrapped_array_keeps_its_lengths_along_the_skin(atlas):
+    wrapped = Taxels.wrapped(8, 9, pitch_mm=1.5, atlas=atlas)
+    assert not wrapped.off.any()
+    area = np.array([atlas.areas_mm2[pixels].sum() for pixels in wrapped.footprints])
+    # A flat array of this width covers more and more skin to the sides; this one 1.5 mm x 1.5 mm with each taxel.
+    np.testing.assert_allclose(area, 1.5**2, rtol=0.2)
+    middle = np.array([atlas.places_mm[pixels].mean(axis=0) for pixels in wrapped.footprints]).reshape(8, 9, 3)
+    for axis in (0, 1):
+        steps = np.linalg.norm(np.diff(middle, axis=axis), axis=2)
+        np.testing.assert_allclose(steps, 1.5, rtol=0.12)
+    assert (np.diff(middle[:, 4, 0]) > 1.3).all() and (np.diff(middle[4, :, 1]) > 0.2).all()
+    # It climbs the sides of the finger, and its readings make the pressure that they were read of.
+    assert (middle[:, 0, 2] > middle[:, 4, 2] + 1.2).all()
+    truth = pressed(atlas, 0.5)
+    found = wrapped.pressure(wrapped.read(truth))
+    assert wrapped.reproduction(wrapped.read(truth), found) < 0.03
+    assert atlas.force_n(found) == pytest.approx(0.5, rel=0.1)
+
+
+def test_lengths_along_the_skin_are_those_of_the_guide(atlas):
+    from papilla.sensors.places import unrolled
+
+    maps = np.full((5, 224 * 224), np.nan)
+    maps[:, atlas.pixels] = [*unrolled(atlas), *atlas.places_mm.T]
+    maps = maps.reshape(5, 224, 224)
+    # From pixel to pixel along rows, and along columns.
+    for steps, x_mm in ((np.diff(maps, axis=2), maps[2, :, 1:]), (np.diff(maps, axis=1), maps[2, 1:])):
+        off = np.abs(np.hypot(*steps[:2]) / np.linalg.norm(steps[2:], axis=0) - 1)
+        for low, high, most in ((6.0, 10.0, 0.25), (10.0, 25.0, 0.07)):
+            assert np.nanpercentile(off[(x_mm > low) & (x_mm <= high)], 90) < most
+
+
+def test_a_wrapped_array_turns_on_the_skin(atlas):
+    straight = Taxels.wrapped(1, 7, pitch_mm=1.5, atlas=atlas)
+    turned = Taxels.wrapped(7, 1, pitch_mm=1.5, yaw_deg=90.0, atlas=atlas)
+    for pixels in straight.footprints:
+        best = max(len(np.intersect1d(pixels, other)) for other in turned.footprints)
+        assert best > 0.9 * len(pixels)
+
+
+def test_posed_taxels_cover_the_skin_that_they_face(atlas):
+    # The middle of a flat array, taxel by taxel; and one that was turned to face the finger's side.
+    flat = Taxels.grid(3, 3, pitch_mm=2.0, atlas=atlas)
+    places = [[11.25 + 2.0 * i, 2.0 * j, -6.53] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    posed = Taxels.at(mm=places, area_mm2=4.0, quaternion=[0, 0, 0, 1], atlas=atlas)
+    for one, other in zip(flat.footprints, posed.footprints, strict=True):
+        assert len(np.setxor1d(one, other)) < 0.12 * len(one)
+    side = int(np.argmax(atlas.places_mm[:, 1]))
+    # Facing along -y: its z is turned there about x.
+    turned = [np.sin(np.pi / 4), 0, 0, np.cos(np.pi / 4)]
+    beside = Taxels.at(mm=[atlas.places_mm[side]], area_mm2=4.0, quaternion=turned, atlas=atlas)
+    from papilla.sensors.places import normals
+
+    assert (normals(atlas)[beside.footprints[0]][:, 1] > 0.2).all()
+    away = Taxels.at(mm=[[11.25, 0, -6.53], [11.25, 0, -12.0]], area_mm2=4.0, quaternion=[0, 0, 0, 1], atlas=atlas)
+    assert list(away.off) == [False, True]
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (lambda a: Taxels.wrapped(4, 4, pitch_mm=2, centre_mm=[11.25, 0, 0], atlas=a), "mm from the skin"),
+        (lambda a: Taxels.wrapped(4, 4, pitch_mm=2, yaw_deg=np.nan, atlas=a), "yaw_deg: nan"),
+        (lambda a: Taxels.at(mm=[[11, 0, -6]], area_mm2=1, quaternion=[[0, 0, 1]], atlas=a), r"\(taxels, 4\)"),
+        (lambda a: Taxels.at(mm=[[11, 0, -6]], area_mm2=1, quaternion=[1, 1, 1, 1], atlas=a), "unit quaternion"),
         (lambda a: Taxels.grid(4, 4, pitch_mm=0.002, atlas=a), "was m meant"),
         (lambda a: Taxels.grid(0, 4, pitch_mm=2, atlas=a), "0 x 4 taxels"),
         (lambda a: Taxels.grid(4, 4, pitch_mm=2, taxel_mm=3, atlas=a), "at most the pitch"),
@@ -134,6 +221,13 @@ def test_a_list_of_taxels_lies_where_it_is_said_to(atlas):
         (lambda a: Taxels.at(mm=[[11, 0, -6]], area_mm2=0, atlas=a), "above 0"),
         (lambda a: Taxels.grid(4, 4, pitch_mm=2, atlas=a).pressure(np.ones((4, 5))), "due"),
         (lambda a: Taxels.grid(4, 5, pitch_mm=2, atlas=a).pressure(np.ones((4, 5, 9))), "moveaxis"),
+        (lambda a: Taxels.grid(4, 5, pitch_mm=2, atlas=a).pressure(np.ones((20, 9))), "moveaxis"),
+        (lambda a: Taxels.grid(4, 5, pitch_mm=2, atlas=a).pressure(np.ones((5, 4))), "rows and columns seem"),
+        (lambda a: Taxels.grid(4.0, 5, pitch_mm=2, atlas=a), "whole numbers"),
+        (lambda a: Taxels.grid(4, 5, pitch_mm="2", atlas=a), "pitch_mm: '2'; a distance"),
+        (lambda a: Taxels.grid(4, 5, pitch_mm=2, noise="low", atlas=a), "noise: 'low'"),
+        (lambda a: Taxels.grid(4, 5, pitch_mm=2, dead=3, atlas=a), "dead: 3; whole numbers"),
+        (lambda a: Taxels.wrapped(4, 5, pitch_mm=2, yaw_deg="x", atlas=a), "yaw_deg: 'x'"),
         (lambda a: Taxels.grid(4, 4, pitch_mm=2, atlas=a).pressure(np.full((3, 16), np.nan)), "frame 0: taxel"),
     ],
 )
@@ -214,6 +308,10 @@ def replace(name, old, new):
         (replace("glove.toml", "rows", "row"), (), "grid.row"),
         (replace("glove.toml", "pitch_mm = 2.0", ""), (), "grid.pitch_mm"),
         (replace("glove.toml", "[grid]", "[grid"), (), "no TOML"),
+        (replace("glove.toml", "[grid]", "[grid]\nyaw_deg = 3"), (), "turns by quaternion"),
+        (replace("glove.toml", "[grid]", "[grid]\nwrapped = 1"), (), "true or false"),
+        (replace("glove.toml", "[record]", '[record]\ntopic = "/t"'), (), "is no bag of ROS"),
+        (replace("record.csv", "time_ms", "time_fortnight"), (), "is no unit of time"),
         (replace("glove.toml", '"kPa"', '"Pa"'), (), "unit='kPa'"),
         (lambda folder: None, ("--out", "x.mat"), "none of .nc"),
         (lambda folder: (folder / "record.csv").unlink(), (), "does not exist"),
@@ -246,3 +344,103 @@ def test_the_packages_are_loaded_when_they_are_named():
     code = "import sys, papilla; assert 'papilla.sensors' not in sys.modules; papilla.sensors.Taxels; papilla.nothing"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "no attribute 'nothing'" in done.stderr
+
+
+def test_dates_are_times(tmp_path):
+    stamps = ["2026-03-01T12:00:00.000", "2026-03-01T12:00:00.250", "2026-03-01T12:00:01+00:00"]
+    (tmp_path / "a.csv").write_text("stamp,a\n" + "".join(f"{stamp},{i}\n" for i, stamp in enumerate(stamps)))
+    assert sensors.read_record(tmp_path / "a.csv").times_s == pytest.approx([0.0, 0.25, 1.0], abs=1e-6)
+    (tmp_path / "b.csv").write_text("t,a\n0,2026-03-01\n1,2026-03-02\n")
+    with pytest.raises(papilla.BadInput, match="column 'a': dates"):
+        sensors.read_record(tmp_path / "b.csv")
+    (tmp_path / "c.csv").write_text("t,a\n2026-03-01,1\nlate,2\n")
+    with pytest.raises(papilla.BadInput, match="line 3, column 't': 'late'"):
+        sensors.read_record(tmp_path / "c.csv")
+
+
+@pytest.fixture
+def bag(tmp_path):
+    """Writes a bag of ROS 2 with messages of a type on a topic; gives its folder."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+
+    def write(messages, kind="std_msgs/msg/Float32MultiArray", topic="/glove"):
+        folder = tmp_path / "bag"
+        with Writer(folder, version=9) as writer:
+            connection = writer.add_connection(topic, kind, typestore=store)
+            for stamp_ns, members in messages:
+                message = store.types[kind](**members(store.types))
+                writer.write(connection, stamp_ns, store.serialize_cdr(message, kind))
+        return folder
+
+    return write
+
+
+def multi_array(values):
+    def members(types):
+        layout = types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+        return {"layout": layout, "data": np.array(values, np.float32)}
+
+    return members
+
+
+def joint_state(second, nanosecond, values):
+    def members(types):
+        stamp = types["builtin_interfaces/msg/Time"](sec=second, nanosec=nanosecond)
+        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="glove")
+        array = np.array(values, np.float64)
+        return {"header": header, "name": [], "position": array, "velocity": 2 * array, "effort": 3 * array}
+
+    return members
+
+
+def test_a_bag_of_ros_is_a_record(bag):
+    start = 1_790_000_000_123_456_789
+    folder = bag([(start + 10_000_000 * i, multi_array([i, 2.5, -i])) for i in range(4)])
+    record = sensors.read_record(folder, topic="/glove")
+    np.testing.assert_allclose(record.times_s, 0.01 * np.arange(4), atol=1e-9)
+    assert record.readings.tolist() == [[i, 2.5, -i] for i in range(4)] and record.names == ["0", "1", "2"]
+    # The file within the folder is the same bag.
+    (file,) = folder.glob("*.db3")
+    assert sensors.read_record(file, topic="/glove").readings.tolist() == record.readings.tolist()
+    with pytest.raises(papilla.BadInput, match=r"no topic '/gloves'; there are /glove"):
+        sensors.read_record(folder, topic="/gloves")
+    with pytest.raises(papilla.BadInput, match="name the topic of the readings; there are /glove"):
+        sensors.read_record(folder)
+
+
+def test_the_header_of_a_message_has_its_time(bag):
+    messages = [(7, joint_state(100, 0, [1.0])), (9, joint_state(100, 250_000_000, [2.0]))]
+    folder = bag(messages, "sensor_msgs/msg/JointState")
+    record = sensors.read_bag(folder, "/glove", field="effort")
+    assert record.times_s.tolist() == [0.0, 0.25] and record.readings.tolist() == [[3.0], [6.0]]
+    with pytest.raises(papilla.BadInput, match="position, velocity, effort: name one"):
+        sensors.read_bag(folder, "/glove")
+    with pytest.raises(papilla.BadInput, match="no member 'force'; there are header, name, position"):
+        sensors.read_bag(folder, "/glove", field="force")
+    with pytest.raises(papilla.BadInput, match=r"header\.stamp is no array"):
+        sensors.read_bag(folder, "/glove", field="header.stamp")
+
+
+def test_a_bag_that_is_none_is_named(bag, tmp_path):
+    folder = bag([(0, multi_array([1.0, 2.0])), (1_000_000, multi_array([1.0]))])
+    with pytest.raises(papilla.BadInput, match="message 1 of /glove has 1 readings, the first 2"):
+        sensors.read_record(folder, topic="/glove")
+    with pytest.raises(papilla.BadInput, match="without a metadata"):
+        sensors.read_record(tmp_path, topic="/glove")
+    (tmp_path / "torn.mcap").write_bytes(b"no bag")
+    with pytest.raises(papilla.BadInput, match="no readable bag"):
+        sensors.read_record(tmp_path / "torn.mcap", topic="/glove")
+
+
+def test_the_command_reads_a_bag(url, atlas, bag, tmp_path):
+    forces = write_record(tmp_path, atlas)
+    record = sensors.read_record(tmp_path / "record.csv")
+    bag([(20_000_000 * i, multi_array(row)) for i, row in enumerate(record.readings)])
+    words = [sys.executable, "-m", "papilla", "sense", "bag", "--sensor", "glove.toml", "--url", url]
+    more = ["--topic", "/glove", "--json", "--no-maps", "--tier", "half-space"]
+    done = subprocess.run([*words, *more], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["force_max_n"] == pytest.approx(forces.max(), rel=0.1)

@@ -1,23 +1,81 @@
-"""The gallery's scripts that need no service run, and find what they promise."""
+"""The gallery's scripts that need no service run, find what they promise, and draw their pictures."""
 
 import runpy
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
-def test_finger(tmp_path, monkeypatch):
+@pytest.fixture
+def example(tmp_path, monkeypatch):
+    """Runs a script in its short form; gives its names."""
     monkeypatch.chdir(tmp_path)
-    found = runpy.run_path(str(EXAMPLES / "finger.py"))["found"]
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.setenv("PAPILLA_URL", "local")
+
+    def run(name, picture=True, **short):
+        for variable, value in short.items():
+            monkeypatch.setenv(variable, value)
+        found = runpy.run_path(str(EXAMPLES / f"{name}.py"))
+        if picture:
+            assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+        return found
+
+    return run
+
+
+def test_finger(example, tmp_path):
+    found = example("finger", picture=False)["found"]
     assert all((np.diff(force_n) >= 0).all() and force_n[-1] > 0.05 for force_n in found.values())
     assert len((tmp_path / "force.csv").read_text().splitlines()) == 10
 
 
-def test_own_pressure(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    found = runpy.run_path(str(EXAMPLES / "own_pressure.py"))
+def test_own_pressure(example, tmp_path):
+    found = example("own_pressure")
     assert abs(found["state"].force_n[2] - 0.1) < 0.02
     assert found["network"].max() > found["state"].sed_j_per_m3.max() > 0
     assert len(found["trains"].unit) > 10 and (tmp_path / "felt.npz").is_file()
+
+
+def test_effect_worth(example):
+    found = {effect.name: effect for effect in example("effect_worth")["found"]}
+    assert found["layers"].sed_change > 0.05 and found["finite_strain"].sed_change > 0.05
+    assert all(effect.why_not is None and effect.seconds_without > 0 for effect in found.values())
+
+
+def test_hard_case(example):
+    found = example("hard_case")
+    assert found["failed"].kind == "no_equilibrium" and found["refused"].field == "indenter.radius_mm"
+    assert len(found["found"]) == found["failed"].states > 5 and (np.diff(found["forces_n"]) > 0).all()
+
+
+def test_braille(example):
+    found = example("braille", WORD="al")
+    trains, dots_mm = found["trains"], found["dots_mm"]
+    mine = trains.classes[trains.unit] == "sa1"
+    assert mine.sum() > 50
+    # Spikes fall on the dots, not between them.
+    at_mm = np.interp(1e-6 * trains.time_us[mine], found["times_s"], found["way_mm"])
+    x_mm, y_mm = found["units_mm"][trains.unit[mine], :2].T
+    spikes_mm = np.stack([at_mm + y_mm, 11.25 - x_mm], axis=1)
+    off_mm = np.linalg.norm(spikes_mm[:, None] - dots_mm[None], axis=2).min(axis=1)
+    assert np.median(off_mm) < 1.5
+
+
+def test_hand(example):
+    found = example("hand", FRAMES="12")
+    forces_n = [answer.touch.force_n[2] for answer in found["answers"][-1]]
+    np.testing.assert_allclose(forces_n, [force_n for _, force_n in found["hand"].values()], rtol=0.02)
+    assert all(len(own.unit) > 0 for own in found["trains"])
+
+
+def test_pins(example):
+    found = example("pins")
+    fit, formula = found["driven"]["fit"], found["driven"]["formula"]
+    # The pin in the middle of the ring stays still, those under it press.
+    middle = found["places"].index((11.25, 0.0))
+    assert fit[middle] < 0.3 * fit.max() and 4 <= (fit > 0.05 * fit.max()).sum() < len(fit)
+    assert formula.max() > 0

@@ -166,3 +166,25 @@ def test_answers_are_arrays_that_can_be_written_to_and_stay(pressure_pa):
         session.render(pressure_pa * 0.5)
         assert np.array_equal(first, kept)
         first += 1
+
+
+def test_a_series_without_a_service_is_that_of_the_service(url, pressure_pa, monkeypatch):
+    frames, times_s = np.linspace(0, 1, 6)[:, None, None] * pressure_pa, 0.01 * np.arange(6)
+    for more in ({}, {"effects": ["afferents", "spikes"]}):
+        here = papilla.render(frames, times_s, url="local", lanes=None, **more)
+        there = papilla.render(frames, times_s, url=url, **more)
+        assert (
+            here.sed.tobytes() == there.sed.tobytes()
+            and here["error_sed_p90"].tobytes() == there["error_sed_p90"].tobytes()
+        )
+    assert here.spikes.time_us.tobytes() == there.spikes.time_us.tobytes()
+    # Stills go over several threads, in any order, to the same bits.
+    stills = papilla.render(frames, url="local", lanes=3)
+    assert stills.sed.tobytes() == papilla.render(frames, url=url, lanes=1).sed.tobytes()
+    atlas = papilla.Atlas.load("local")
+    assert atlas.hash == papilla.Atlas.load(url).hash
+    with pytest.raises(papilla.BadInput, match="at a service"):
+        papilla.Atlas.load("local", finger="anna")
+    monkeypatch.setenv("PAPILLA_MODELS", "nowhere")
+    with pytest.raises(papilla.BadModels, match="nowhere"):
+        papilla.render(frames, url="local")

@@ -13,9 +13,9 @@ from ..http import DEFAULT_URL
 from .taxels import Taxels
 
 _SENSOR: Final = {"name", "unit", "gain", "offset", "noise", "dead"}
-_GRID: Final = {"rows", "columns", "pitch_mm", "taxel_mm", "centre_mm", "quaternion"}
-_TAXEL: Final = {"mm", "px", "area_mm2", "gain", "offset"}
-_RECORD: Final = {"time", "time_unit", "rate_hz", "columns"}
+_GRID: Final = {"rows", "columns", "pitch_mm", "taxel_mm", "centre_mm", "quaternion", "wrapped", "yaw_deg"}
+_TAXEL: Final = {"mm", "px", "area_mm2", "quaternion", "gain", "offset"}
+_RECORD: Final = {"time", "time_unit", "rate_hz", "columns", "topic", "field"}
 
 
 def _read(path: str | PathLike[str]) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def describe(
             missing = [name for name in ("rows", "columns", "pitch_mm") if name not in held["grid"]]
             if missing:
                 raise BadInput(f"grid.{missing[0]}", f"{Path(path).name}: it is missing")
-            return Taxels.grid(**held["grid"], atlas=atlas, **sensor)
+            return _grid(Path(path).name, held["grid"], atlas, sensor)
         taxels = held["taxel"]
         for number, taxel in enumerate(taxels):
             missing = [name for name in ("area_mm2",) if name not in taxel]
@@ -70,9 +70,29 @@ def describe(
                 default = sensor.get(member, 1.0 if member == "gain" else 0.0)
                 sensor[member] = [taxel.get(member, default) for taxel in taxels]
         places: dict[str, Any] = {kind: [taxel[kind] for taxel in taxels]}
+        turned = ["quaternion" in taxel for taxel in taxels]
+        if any(turned):
+            if not all(turned):
+                missing_at = turned.index(False)
+                raise BadInput(f"taxel[{missing_at}]", "quaternion is missing: give one for every taxel, or for none")
+            places["quaternion"] = [taxel["quaternion"] for taxel in taxels]
         return Taxels.at(**places, area_mm2=[taxel["area_mm2"] for taxel in taxels], atlas=atlas, **sensor)
     except TypeError as error:
         raise BadInput("sensor", f"{Path(path).name}: {error}") from error
+
+
+def _grid(file: str, grid: dict[str, Any], atlas: Atlas, sensor: dict[str, Any]) -> Taxels:
+    """A flat array, or one that wraps the finger."""
+    of_kind = dict(grid)
+    wrapped = of_kind.pop("wrapped", False)
+    if not isinstance(wrapped, bool):
+        raise BadInput("grid.wrapped", f"{file}: {wrapped!r}; true or false is due")
+    wrong = "quaternion" if wrapped else "yaw_deg"
+    if wrong in of_kind:
+        kind = "a wrapped array lies on the skin: turn it by yaw_deg" if wrapped else "a flat array turns by quaternion"
+        raise BadInput(f"grid.{wrong}", f"{file}: {kind}")
+    make = Taxels.wrapped if wrapped else Taxels.grid
+    return make(**of_kind, atlas=atlas, **sensor)
 
 
 def describe_record(path: str | PathLike[str]) -> dict[str, Any]:

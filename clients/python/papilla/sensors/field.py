@@ -55,16 +55,31 @@ class Field:
         found: NDArray[np.float64] = np.add.reduceat(pressure[:, self._pixels] * self._weights, self._first, axis=1)
         return found
 
-    def solve(self, readings: NDArray[np.float64], noise: NDArray[np.float64]) -> Reals:
-        """Fields with these means, Pa: (frames, pixels)."""
+    def solve(
+        self, readings: NDArray[np.float64], noise: NDArray[np.float64], prior: NDArray[np.float64] | None = None
+    ) -> Reals:
+        """Fields with these means, Pa: (frames, pixels).
+
+        `prior` has fields that the shape of the pressure is known by, (frames, pixels): of all fields with these means
+        the one is taken that is nearest to a multiple of its prior.
+        """
         felt = self.without_noise(readings, noise).astype(np.float32)
         found = np.zeros((len(felt), self._count), np.float32)
         touched = np.flatnonzero(felt.any(axis=1))
         close = float(np.sqrt((noise**2).mean()))
         for start in range(0, len(touched), _BATCH):
             rows = touched[start : start + _BATCH]
-            self._fit(found, rows, felt[rows], close)
+            base = np.zeros((len(rows), 1), np.float32) if prior is None else self._scaled(felt[rows], prior[rows])
+            self._fit(found, rows, felt[rows], close, base)
         return found
+
+    def _scaled(self, felt: Reals, prior: NDArray[np.float64]) -> Reals:
+        """The multiple of each prior whose means come nearest to the readings."""
+        means = self.means(prior)
+        squared = (means**2).sum(axis=1)
+        factor = np.divide((means * felt).sum(axis=1), squared, out=np.zeros_like(squared), where=squared > 0)
+        scaled: Reals = (factor[:, None] * prior).astype(np.float32)
+        return scaled
 
     def without_noise(self, readings: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
         """Zero where no touch stands out: a reading counts from 3 standard deviations of the noise on, and beside
@@ -78,12 +93,13 @@ class Field:
                 return np.where(counts, readings, 0.0)
             counts = grown
 
-    def _fit(self, found: Reals, rows: NDArray[np.int64], wanted: Reals, close: float) -> None:
+    def _fit(self, found: Reals, rows: NDArray[np.int64], wanted: Reals, close: float, base: Reals) -> None:
+        """`base` is what the smoothest field is added to: (rows, pixels or 1)."""
         if self._operator is None:
             self._operator = self._smoothest()
         limit = np.maximum(NEAR * close, _CLOSE * wanted.max(axis=1))
-        given = wanted.copy()
-        field = np.maximum(given @ self._operator, 0.0)
+        given = wanted - self.means(base.astype(np.float64)).astype(np.float32) if base.any() else wanted.copy()
+        field = np.maximum(base + given @ self._operator, 0.0)
         left = wanted - self.means(field).astype(np.float32)
         off = np.sqrt((left**2).mean(axis=1))
         step = np.ones(len(rows), np.float32)
@@ -92,7 +108,7 @@ class Field:
             if not len(open_):
                 break
             tried = given[open_] + step[open_, None] * left[open_]
-            new = np.maximum(tried @ self._operator, 0.0)
+            new = np.maximum(base[open_] + tried @ self._operator, 0.0)
             new_left = wanted[open_] - self.means(new).astype(np.float32)
             new_off = np.sqrt((new_left**2).mean(axis=1))
             better = new_off < off[open_]

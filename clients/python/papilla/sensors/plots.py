@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import MissingExtra
 from ..save import whole
 from ..wire import SIDE_PX
-from .records import Record
+from .record import Record
 from .sense import Sensed
 from .taxels import Taxels
 

@@ -6,29 +6,24 @@ import csv
 import math
 import zipfile
 from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
 from os import PathLike
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import check
 from ..errors import BadInput
+from .bags import is_bag, read_bag
+from .record import Record, from_zero
 
 TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_UNITS: Final = ", ".join(TIME_UNITS)
+_SPELLED: Final = {"sec": "s", "secs": "s", "seconds": "s", "msec": "ms", "milliseconds": "ms", "usec": "us"}
+_EPOCH: Final = datetime(2020, 1, 1, tzinfo=UTC)
 _TIME_NAMES: Final = ("time", "t", "timestamp", "stamp")
-
-
-class Record(NamedTuple):
-    """Readings of a sensor over time."""
-
-    times_s: NDArray[np.float64]
-    """From the first reading on, s."""
-    readings: NDArray[np.float64]
-    """(frames, taxels)."""
-    names: list[str]
-    """Of the taxels."""
 
 
 def read_record(
@@ -38,22 +33,32 @@ def read_record(
     time_unit: str | None = None,
     rate_hz: float | None = None,
     columns: Sequence[str] | str | None = None,
+    topic: str | None = None,
+    field: str | None = None,
 ) -> Record:
-    """Reads a record from CSV (a header, then a row for each moment) or NPZ (`times_s` and `readings`).
+    """Reads a record from CSV (a header, then a row for each moment), NPZ (`times_s` and `readings`) or a ROS bag.
 
     `time` names the column of times; without it one is looked for (`time_s`, `t_ms`, `timestamp` and so on).
     `time_unit` is s, ms, us or ns; without it the end of the name says it. `rate_hz` stands in for times.
+    A time may also be a date and time as of ISO 8601, such as 2026-03-01T12:00:00.250.
     `columns` lists the taxels in their order, or gives what their names begin with; without it all but time.
-    Raises BadInput with line and column.
+    Of a bag (a folder of ROS 2, .mcap, .db3, .bag) `topic` carries the readings, and `field` is the member of its
+    messages that holds them; see `read_bag`. Raises BadInput with line and column.
     """
     file = Path(path)
-    if not file.is_file():
+    if not file.exists():
         raise BadInput("record", f"{file} does not exist")
+    if is_bag(file):
+        return read_bag(file, topic, field=field)
+    if not file.is_file():
+        raise BadInput("record", f"{file} is a folder without a metadata.yaml, so no bag of ROS 2")
+    if topic is not None or field is not None:
+        raise BadInput("topic", f"{file.name} is no bag of ROS: topic and field are of those")
     if file.suffix == ".npz":
         return _npz(file, time or "times_s", time_unit, rate_hz)
     if file.suffix.lower() not in (".csv", ".tsv", ".txt"):
-        raise BadInput("record", f"{file.name} is none of .csv, .tsv, .txt and .npz")
-    names, values = _table(file)
+        raise BadInput("record", f"{file.name} is none of .csv, .tsv, .txt, .npz, .mcap, .db3 and .bag")
+    names, values, dated = _table(file)
     at = _time_column(names, time, rate_hz)
     own = _taxel_columns(names, columns, at)
     readings = values[:, own]
@@ -63,8 +68,11 @@ def read_record(
     if at is None:
         times_s = np.arange(len(values)) / _rate(rate_hz)
     else:
-        times_s = values[:, at] * _time_factor(names[at], time_unit)
-    return Record(_from_zero(times_s), readings, [names[i] for i in own])
+        times_s = values[:, at] * (1.0 if at in dated else _time_factor(names[at], time_unit))
+    for column in own:
+        if column in dated:
+            raise BadInput("record", f"{file.name}, column '{names[column]}': dates, where readings are due")
+    return Record(from_zero(times_s), readings, [names[i] for i in own])
 
 
 def _npz(file: Path, time: str, time_unit: str | None, rate_hz: float | None) -> Record:
@@ -83,11 +91,11 @@ def _npz(file: Path, time: str, time_unit: str | None, rate_hz: float | None) ->
         times_s = check.numbers(held[time], time).astype(np.float64) * _time_factor(time, time_unit)
     else:
         times_s = np.arange(len(readings)) / _rate(rate_hz)
-    return Record(_from_zero(check.times(times_s, len(readings))), readings, [str(i) for i in range(readings.shape[1])])
+    return Record(from_zero(check.times(times_s, len(readings))), readings, [str(i) for i in range(readings.shape[1])])
 
 
-def _table(file: Path) -> tuple[list[str], NDArray[np.float64]]:
-    """Names of columns, and numbers; empty cells and `nan` are NaN."""
+def _table(file: Path) -> tuple[list[str], NDArray[np.float64], set[int]]:
+    """Names of columns, numbers, and the columns of dates, whose numbers are s; empty cells and `nan` are NaN."""
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -101,7 +109,7 @@ def _table(file: Path) -> tuple[list[str], NDArray[np.float64]]:
     names = [name.strip() for name in rows[0]]
     if all(_is_number(name) for name in names):
         raise BadInput("record", f"{file.name} has no header: its first line should name the columns, as time_s,t0,t1")
-    values = np.empty((len(rows) - 1, len(names)))
+    values, dated = np.empty((len(rows) - 1, len(names))), set[int]()
     for number, row in enumerate(rows[1:]):
         if len(row) != len(names):
             raise BadInput("record", f"{file.name}, line {number + 2}: {len(row)} cells for {len(names)} columns")
@@ -110,11 +118,27 @@ def _table(file: Path) -> tuple[list[str], NDArray[np.float64]]:
             if mark == ";":
                 cell = cell.replace(",", ".")
             if cell and not _is_number(cell):
+                second = _second(cell)
+                if second is not None and (number == 0 or column in dated):
+                    dated.add(column)
+                    values[number, column] = second
+                    continue
                 raise BadInput(
                     "record", f"{file.name}, line {number + 2}, column '{names[column]}': {cell!r} is no number"
                 )
             values[number, column] = float(cell) if cell else math.nan
-    return names, values
+    return names, values, dated
+
+
+def _second(text: str) -> float | None:
+    """A date and time of ISO 8601, in s; without a zone as of UTC."""
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    if moment.tzinfo is None:
+        moment = moment.replace(tzinfo=UTC)
+    return (moment - _EPOCH) / timedelta(seconds=1)
 
 
 def _is_number(text: str) -> bool:
@@ -139,11 +163,15 @@ def _time_column(names: list[str], time: str | None, rate_hz: float | None) -> i
 
 
 def _time_factor(name: str, unit: str | None) -> float:
+    """Seconds of a step of a column; without a unit the end of its name says it."""
     if unit is None:
-        end = name.lower().rpartition("_")[2]
-        unit = end if end in TIME_UNITS else "s"
+        stem, _, end = name.lower().rpartition("_")
+        unit = _SPELLED.get(end, end)
+        if unit not in TIME_UNITS and stem in _TIME_NAMES and end not in _TIME_NAMES:
+            raise BadInput("time_unit", f"{end!r} of column '{name}' is no unit of time: say which of {_UNITS} is")
+        unit = unit if unit in TIME_UNITS else "s"
     if unit not in TIME_UNITS:
-        raise BadInput("time_unit", f"{unit!r} is none of {', '.join(TIME_UNITS)}")
+        raise BadInput("time_unit", f"{unit!r} is none of {_UNITS}")
     return TIME_UNITS[unit]
 
 
@@ -168,9 +196,3 @@ def _rate(rate_hz: float | None) -> float:
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise BadInput("rate_hz", f"{rate_hz}; a rate above 0 is due")
     return rate_hz
-
-
-def _from_zero(times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    checked = check.times(times_s, len(times_s))
-    shifted: NDArray[np.float64] = checked - checked[0]
-    return shifted

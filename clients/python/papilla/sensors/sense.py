@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import check
 from ..errors import BadInput
@@ -15,9 +16,9 @@ from ..http import DEFAULT_URL
 from ..rendering import render_chunks
 from ..send_series import Progress, line
 from ..series import Series, joined
-from ..wire import Map
+from ..wire import SIDE_PX, Map
 from .expect import Expected, expected
-from .records import Record
+from .record import Record
 from .taxels import Taxels
 
 _BATCH: Final = 64
@@ -86,18 +87,24 @@ def sense(
     tier: str | None = None,
     effects: Sequence[str] = ("summary", "afferents"),
     maps: bool = True,
+    prior: ArrayLike | None = None,
     progress: Progress = None,
     **hello: Any,
 ) -> Sensed:
     """SED, firing rates and, with the effect `spikes`, spikes under a sensor over time.
 
-    `maps=False` keeps numbers alone: a map takes 0.2 MB a frame, and there are up to three.
+    `maps=False` keeps numbers alone: a map takes 0.2 MB a frame, and there are up to three. `prior` is what is known
+    of the pressure's shape, for each frame or for all; see `Taxels.pressure`.
     Raises BadInput before anything is sent.
     """
     if record.readings.shape[1] != len(sensor):
         raise BadInput(
             "record", f"it has {record.readings.shape[1]} taxels, and the sensor '{sensor.name}' {len(sensor)}"
         )
+    shapes = None if prior is None else check.numbers(prior, "prior")
+    if shapes is not None and shapes.shape not in (check.SIDE, (len(record.readings), *check.SIDE)):
+        due_shape = f"{check.SIDE} or ({len(record.readings)}, {SIDE_PX}, {SIDE_PX})"
+        raise BadInput("prior", f"shape {shapes.shape}; {due_shape} is due")
     pressure = sensor.pascals(record.readings)
     greatest = float(np.nanmax(pressure))
     check.ask_unit(max(greatest, 0.0), "pressure", " of the sensor")
@@ -114,7 +121,8 @@ def sense(
     def fields() -> Iterator[Map]:
         for start in range(0, len(record.readings), _BATCH):
             readings = record.readings[start : start + _BATCH]
-            found = sensor.pressure(readings)
+            known = None if shapes is None else shapes[start : start + _BATCH] if shapes.ndim == 3 else shapes
+            found = sensor.pressure(readings, prior=known)
             errors.append(sensor.reproduction(readings, found))
             if maps:
                 kept.append(found)

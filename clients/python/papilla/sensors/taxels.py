@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -13,20 +14,17 @@ from ..atlas import Atlas
 from ..errors import BadInput
 from ..http import DEFAULT_URL
 from ..wire import SIDE_PX, Map
-from . import field
+from . import field, places
+from .places import PAD_MM, rotation, vector
 
 Numbers = NDArray[np.float64]
-PAD_MM: Final = (11.25, 0.0, -6.53)
-"""The lowest point of the pad."""
 UNITS: Final = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N": 1e6, "mN": 1e3}
 """Of a reading times its gain; N and mN are of force over the taxel."""
-_REACH_MM: Final = 3.0
-_FACING: Final = -0.2
 _MOST: Final = 2048
 
 
 class Taxels:
-    """An array of taxels on the finger. Make one by `grid`, `flat` or `at`.
+    """An array of taxels on the finger. Make one by `grid`, `wrapped` or `at`.
 
     `unit`, `gain` and `offset` say what a reading means: pressure = (reading - offset) * gain in `unit`.
     `noise` is the standard deviation of a reading, in readings. `dead` lists taxels whose readings say nothing.
@@ -53,9 +51,9 @@ class Taxels:
             raise BadInput("taxels", f"there are {count}; 1 to {_MOST} are due")
         if unit not in UNITS:
             raise BadInput("unit", f"{unit!r} is none of {', '.join(UNITS)}")
-        if not (np.isfinite(noise) and noise >= 0):
+        if check.number(noise, "noise", "the standard deviation of a reading") < 0:
             raise BadInput("noise", f"{noise}; a standard deviation of a reading is due, 0 or above")
-        if not (np.isfinite(pitch_mm) and pitch_mm > 0):
+        if check.number(pitch_mm, "pitch_mm", "a distance in mm") <= 0:
             raise BadInput("pitch_mm", f"{pitch_mm}; a distance above 0 is due")
         self.atlas, self.name, self.unit, self.noise = atlas, name, unit, float(noise)
         self.pitch_mm = float(pitch_mm)
@@ -65,10 +63,11 @@ class Taxels:
         self.footprints = [np.asarray(pixels, np.int64) for pixels in footprints]
         self.off = np.array([not len(pixels) for pixels in self.footprints])
         """Taxels that lie beside the finger; their readings are left out."""
-        wrong = [number for number in dead if not 0 <= number < count]
+        numbers = _whole("dead", dead)
+        wrong = [number for number in numbers if not 0 <= number < count]
         if wrong:
             raise BadInput("dead", f"taxel {wrong[0]} does not exist; they count from 0 to {count - 1}")
-        self.dead = np.isin(np.arange(count), np.asarray(dead, int))
+        self.dead = np.isin(np.arange(count), np.array(numbers, int))
         self.live = ~(self.dead | self.off)
         if not self.live.any():
             raise BadInput("taxels", "none of them lies on the finger: look at centre, pose and unit (mm) of the array")
@@ -97,33 +96,48 @@ class Taxels:
         token: str | None = None,
         **more: Any,
     ) -> Taxels:
-        """A flat array that the finger presses on, or that wraps it from below.
+        """A flat array that the finger presses on.
 
         Row 0 is nearest to the fingertip, column 0 at the least y, as seen in the finger's frame: the array's
         rows run along x and its columns along y, its face looks along z, to the pad. `quaternion` (x y z w)
         turns it about `centre_mm`. Each taxel is a square with sides of `taxel_mm` (the pitch), and covers the
         skin that lies over it along the face's direction. Without `atlas` the service at `url` gives it.
         """
-        whole = isinstance(rows, int) and isinstance(columns, int)
-        if not whole or rows < 1 or columns < 1 or rows * columns > _MOST:
-            raise BadInput("rows", f"{rows} x {columns} taxels; 1 to {_MOST} in all are due")
-        if not (np.isfinite(pitch_mm) and 0.05 <= pitch_mm <= 30):
-            raise BadInput("pitch_mm", f"{pitch_mm} mm; 0.05 to 30 are due. Lengths are in mm; was m meant?")
-        side_mm = pitch_mm if taxel_mm is None else taxel_mm
-        if not 0 < side_mm <= pitch_mm * (1 + 1e-9):
-            raise BadInput("taxel_mm", f"{side_mm} mm; a side above 0 and at most the pitch, {pitch_mm} mm, is due")
+        rows, columns, side_mm = _grid(rows, columns, pitch_mm, taxel_mm)
         atlas = Atlas.load(url, token) if atlas is None else atlas
-        turn = _rotation(quaternion)
-        local = (atlas.places_mm - _vector("centre_mm", centre_mm, 3)) @ turn
-        facing = normals(atlas) @ turn[:, 2] < _FACING
-        along = (local[:, 0] / pitch_mm) + (rows - 1) / 2
-        across = (local[:, 1] / pitch_mm) + (columns - 1) / 2
-        row, column = np.rint(along).astype(int), np.rint(across).astype(int)
-        half = 0.5 * side_mm / pitch_mm
-        inside = facing & (np.abs(along - row) <= half) & (np.abs(across - column) <= half)
-        inside &= (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-        own = np.where(inside, row * columns + column, -1)
-        footprints = [np.flatnonzero(own == number) for number in range(rows * columns)]
+        centre, turn = vector("centre_mm", centre_mm, 3), rotation(quaternion)
+        footprints = places.flat(atlas, rows, columns, pitch_mm, side_mm, centre, turn)
+        more.setdefault("area_mm2", side_mm**2)
+        return cls(atlas, footprints, pitch_mm=pitch_mm, shape=(rows, columns), **more)
+
+    @classmethod
+    def wrapped(
+        cls,
+        rows: int,
+        columns: int,
+        *,
+        pitch_mm: float,
+        taxel_mm: float | None = None,
+        centre_mm: ArrayLike = PAD_MM,
+        yaw_deg: float = 0.0,
+        atlas: Atlas | None = None,
+        url: str = DEFAULT_URL,
+        token: str | None = None,
+        **more: Any,
+    ) -> Taxels:
+        """A flexible array that is wrapped around the pad and lies on the skin.
+
+        Its lengths are those along the skin: rows follow one another along the middle of the pad, row 0 nearest to
+        the fingertip, and each row runs around the finger in a plane across it. `yaw_deg` turns the array on the
+        skin about its middle, which lies at the skin nearest to `centre_mm`. Where the skin curves two ways, as at
+        the fingertip, such an array stretches along its rows.
+        """
+        rows, columns, side_mm = _grid(rows, columns, pitch_mm, taxel_mm)
+        turn_deg = check.number(yaw_deg, "yaw_deg", "an angle in degrees")
+        atlas = Atlas.load(url, token) if atlas is None else atlas
+        footprints = places.wrapped(
+            atlas, rows, columns, pitch_mm, side_mm, vector("centre_mm", centre_mm, 3), turn_deg
+        )
         more.setdefault("area_mm2", side_mm**2)
         return cls(atlas, footprints, pitch_mm=pitch_mm, shape=(rows, columns), **more)
 
@@ -134,6 +148,7 @@ class Taxels:
         mm: ArrayLike | None = None,
         px: ArrayLike | None = None,
         area_mm2: ArrayLike,
+        quaternion: ArrayLike | None = None,
         atlas: Atlas | None = None,
         url: str = DEFAULT_URL,
         token: str | None = None,
@@ -141,39 +156,38 @@ class Taxels:
     ) -> Taxels:
         """Single taxels: places in the finger's frame (`mm`, x y z) or on the map (`px`, column and row + 0.5).
 
-        Each covers the skin within a circle of its area. One farther than 3 mm from the skin counts as off.
+        Each covers the skin within a circle of its area. With a `quaternion` (x y z w) for each taxel, or one for
+        all, taxels are flat squares that face along their own z, as on a curved array; each covers the skin that
+        lies over it. A taxel farther than 3 mm from the skin counts as off.
         """
         if (mm is None) == (px is None):
             raise BadInput("mm", "give the places as mm or as px")
         atlas = Atlas.load(url, token) if atlas is None else atlas
         if mm is not None:
-            places = check.numbers(mm, "mm").astype(np.float64)
-            if places.ndim != 2 or places.shape[1] != 3:
-                raise BadInput("mm", f"shape {places.shape}; (taxels, 3) is due")
+            where = check.numbers(mm, "mm").astype(np.float64)
+            if where.ndim != 2 or where.shape[1] != 3:
+                raise BadInput("mm", f"shape {where.shape}; (taxels, 3) is due")
         else:
             spots = check.numbers(px if px is not None else [], "px").astype(np.float64)
             if spots.ndim != 2 or spots.shape[1] != 2:
                 raise BadInput("px", f"shape {spots.shape}; (taxels, 2) is due: column and row")
             centres = np.stack([atlas.pixels % SIDE_PX, atlas.pixels // SIDE_PX], axis=1) + 0.5
             nearest = [int(np.argmin(((centres - spot) ** 2).sum(axis=1))) for spot in spots]
-            places = atlas.places_mm[nearest]
-        if not np.isfinite(places).all():
+            where = atlas.places_mm[nearest]
+        if not np.isfinite(where).all():
             raise BadInput("mm", "a place is not finite")
-        areas = _each("area_mm2", area_mm2, len(places))
+        areas = _each("area_mm2", area_mm2, len(where))
         if (areas <= 0).any():
             raise BadInput("area_mm2", "an area is not above 0")
-        footprints = []
-        for place, area in zip(places, areas, strict=True):
-            off = np.linalg.norm(atlas.places_mm - place, axis=1)
-            own = int(np.argmin(off))
-            if off[own] > _REACH_MM:
-                footprints.append(np.zeros(0, np.int64))
-                continue
-            near = np.linalg.norm(atlas.places_mm - atlas.places_mm[own], axis=1)
-            near[own] = 0.0
-            footprints.append(np.flatnonzero(near <= np.sqrt(area / np.pi)))
+        if quaternion is None:
+            footprints = places.round_(atlas, where, areas)
+        else:
+            turns = np.atleast_2d(check.numbers(quaternion, "quaternion").astype(np.float64))
+            if turns.shape not in ((1, 4), (len(where), 4)):
+                raise BadInput("quaternion", f"shape {turns.shape}; (taxels, 4) is due, or one for all")
+            footprints = places.posed(atlas, where, np.broadcast_to(turns, (len(where), 4)), np.sqrt(areas))
         if "pitch_mm" not in more:
-            more["pitch_mm"] = _spacing(places, areas)
+            more["pitch_mm"] = _spacing(where, areas)
         return cls(atlas, footprints, area_mm2=areas, **more)
 
     def __len__(self) -> int:
@@ -226,19 +240,33 @@ class Taxels:
         noise: Numbers = (self.noise * scale)[self.live]
         return noise
 
-    def pressure(self, readings: ArrayLike) -> Map:
+    def pressure(self, readings: ArrayLike, *, prior: ArrayLike | None = None) -> Map:
         """Maps of pressure, Pa, that reproduce the readings of the taxels: (frames, 224, 224), or one map of one.
 
-        Nowhere negative, smooth, and zero where no taxel felt anything. Readings within the noise are zero.
+        Nowhere negative, smooth, and zero where no taxel felt anything. Readings within the noise are zero. Where it
+        is known what touches, `prior` has the map of each frame, or one for all, that contact finds for it, such as
+        `papilla.Finger().touch(...).pressure_pa`: details finer than the taxels are then taken from it, and its
+        greatness does not matter.
         """
         array = check.numbers(readings, "readings")
         one = array.shape in (self.shape, (len(self),))
         pressure = self.pascals(readings)[:, self.live]
-        found = self._field.solve(pressure, self.noise_pa())
+        shapes = None if prior is None else self._prior(prior, len(pressure))
+        found = self._field.solve(pressure, self.noise_pa(), shapes)
         flat = np.zeros((len(found), SIDE_PX * SIDE_PX), np.float32)
         flat[:, self.atlas.pixels] = found
         maps: Map = flat.reshape(-1, SIDE_PX, SIDE_PX)
         return maps[0] if one else maps
+
+    def _prior(self, prior: ArrayLike, count: int) -> Numbers:
+        """Maps of a prior as (frames, pixels)."""
+        maps = check.numbers(prior, "prior").astype(np.float64)
+        if maps.shape not in (check.SIDE, (count, *check.SIDE)):
+            raise BadInput("prior", f"shape {maps.shape}; {check.SIDE} or ({count}, {SIDE_PX}, {SIDE_PX}) is due")
+        if not np.isfinite(maps).all() or maps.min() < 0:
+            raise BadInput("prior", "a pressure is negative or not finite; skin is pressed, never pulled")
+        flat = maps.reshape(-1, SIDE_PX * SIDE_PX)[:, self.atlas.pixels]
+        return np.broadcast_to(flat, (count, flat.shape[1]))
 
     def reproduction(self, readings: ArrayLike, pressure_pa: ArrayLike) -> Numbers:
         """How far maps are from the readings: norm of the difference over that of the readings, of each frame."""
@@ -268,17 +296,34 @@ class Taxels:
         if array.shape[1:] in (self.shape, (len(self),)):
             return array.reshape(len(array), -1).astype(np.float64)
         due = " or ".join(str(("frames", *shape)).replace("'", "") for shape in {self.shape, (len(self),)})
-        cure = "give np.moveaxis(readings, -1, 0)" if array.shape[:-1] == self.shape else "each frame has all taxels"
+        cure = "each frame has all taxels"
+        if array.shape[:-1] == self.shape or array.shape[:-1] == (len(self),):
+            cure = "time seems to come last: give np.moveaxis(readings, -1, 0)"
+        elif len(self.shape) == 2 and array.shape[-2:] == self.shape[::-1]:
+            cure = "rows and columns seem to be exchanged: give np.swapaxes(readings, -1, -2)"
         raise BadInput("readings", f"shape {array.shape}; {due} is due; {cure}")
 
 
-def normals(atlas: Atlas) -> Numbers:
-    """Unit normals of the skin out of the finger, at each of `atlas.pixels`."""
-    a, b, c = (atlas.positions_mm[atlas.triangles[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    found: Numbers = normal[atlas.owners]
-    return found
+def _grid(rows: int, columns: int, pitch_mm: float, taxel_mm: float | None) -> tuple[int, int, float]:
+    """Rows, columns, and the side of a taxel, mm, of an array that can be."""
+    whole = [_whole(member, [value])[0] for member, value in (("rows", rows), ("columns", columns))]
+    if min(whole) < 1 or whole[0] * whole[1] > _MOST:
+        raise BadInput("rows", f"{rows} x {columns} taxels; 1 to {_MOST} in all are due")
+    pitch_mm = check.number(pitch_mm, "pitch_mm", "a distance in mm")
+    if not 0.05 <= pitch_mm <= 30:
+        raise BadInput("pitch_mm", f"{pitch_mm} mm; 0.05 to 30 are due. Lengths are in mm; was m meant?")
+    side_mm = pitch_mm if taxel_mm is None else check.number(taxel_mm, "taxel_mm", "a length in mm")
+    if not 0 < side_mm <= pitch_mm * (1 + 1e-9):
+        raise BadInput("taxel_mm", f"{side_mm} mm; a side above 0 and at most the pitch, {pitch_mm} mm, is due")
+    return whole[0], whole[1], side_mm
+
+
+def _whole(member: str, values: Any) -> list[int]:
+    """Whole numbers, of Python or NumPy."""
+    try:
+        return [operator.index(value) for value in values]
+    except TypeError as error:
+        raise BadInput(member, f"{values!r}; whole numbers are due") from error
 
 
 def _spacing(places: Numbers, areas: Numbers) -> float:
@@ -298,25 +343,3 @@ def _each(member: str, value: ArrayLike, count: int) -> Numbers:
     if len(array) not in (1, count) or not np.isfinite(array).all():
         raise BadInput(member, f"{len(array)} numbers; one finite number, or one for each of {count} taxels, is due")
     return np.broadcast_to(array, (count,)).copy()
-
-
-def _vector(member: str, value: ArrayLike, length: int) -> Numbers:
-    array = check.numbers(value, member).astype(np.float64)
-    if array.shape != (length,) or not np.isfinite(array).all():
-        raise BadInput(member, f"shape {array.shape}; {length} finite numbers are due")
-    return array
-
-
-def _rotation(quaternion: ArrayLike) -> Numbers:
-    """The matrix of a unit quaternion x y z w."""
-    q = _vector("quaternion", quaternion, 4)
-    if abs(np.linalg.norm(q) - 1) > 1e-3:
-        raise BadInput("quaternion", f"length {np.linalg.norm(q):.4g}; a unit quaternion x y z w is due")
-    x, y, z, w = q / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
