@@ -119,6 +119,12 @@ export class EffectSwitches {
     if (!on) row.now.textContent = '';
   }
 
+  /** Whether a switch can be moved: what cannot be had is not offered. */
+  allow(name, isAllowed) {
+    const row = this.rows.get(name);
+    if (row) row.box.disabled = !isAllowed;
+  }
+
   /** Other terms than an effect have changed: what follows is no effect's doing. */
   forget() {
     this.before = null;

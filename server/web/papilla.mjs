@@ -67,6 +67,7 @@ class Page {
     if (finger) this.control.attachFinger(finger);
     if (this.contact) this.contact.draws = finger !== null;
     this.effects = new EffectSwitches(effects, (name, on) => this.#effect(name, on));
+    this.#allowShear();
     this.comparison = new Comparison((first, second, answer) => this.#showPair(first, second, answer), (message) => notify(message));
     this.hard = new HardCases(atlas, this.contact !== null, (given) => this.#listed(tierFor(listing, this.answered.tier, given)));
     this.session = this.#makeSession();
@@ -355,6 +356,11 @@ class Page {
     this.#open();
   }
 
+  /** Shear comes of an object that rubs: it can be had where the service finds contact. */
+  #allowShear() {
+    this.effects.allow('shear_energy', this.contact !== null && this.mode !== 'replay');
+  }
+
   #setFriction(friction) {
     this.lentFriction = false;
     byId('friction').value = String(friction);
@@ -512,6 +518,7 @@ class Page {
     this.timeline.play(false);
     // Replayed are maps, whatever a press is; what needs friction of an object cannot be had of them.
     if (mode === 'replay' && this.effects.on.has('shear_energy')) this.effects.set('shear_energy', false);
+    this.#allowShear();
     this.effects.forget();
     this.repaint = true;
     this.pictures.pair.of = '';

@@ -192,7 +192,9 @@ test('replay sends maps as ever, and a press is solved again after it', async ()
   await chooseRadio('mode', 'replay');
   await until(() => globalThis.papilla.session.ready && !globalThis.papilla.session.ready.method && globalThis.papilla.replay.judged);
   assert.equal(await page.evaluate(() => globalThis.papilla.pictures.finger.force), null);
+  assert.ok(await page.locator('#effect-shear_energy').isDisabled());
   await chooseRadio('mode', 'press');
+  assert.ok(await page.locator('#effect-shear_energy').isEnabled());
   await until(() => globalThis.papilla.session.ready?.method);
   await settled();
   assert.ok((await felt()).forceN > 0);

@@ -106,6 +106,7 @@ test('without a contact model the page gives maps, and begins with the network t
   const due = listing.tiers.filter(({ kind, learnt }) => kind === 'network' && learnt === 'contact').map(({ name }) => name);
   assert.deepEqual(others, due);
   assert.ok(others.includes('small'));
+  assert.ok(await page.locator('#effect-shear_energy').isDisabled(), 'nothing rubs where no contact is found');
   assert.match(await page.locator('#tier option[value=small]').getAttribute('title'), /learnt the pressure that contact finds/);
 });
 
