@@ -24,6 +24,7 @@ sealed class Outcome
     internal Touch Touch;
     internal int Finger;
     internal float[] PressurePa;
+    internal ErrorEstimate ErrorEstimate = ErrorEstimate.Unknown;
 }
 
 /// <content>What is expected, and the patterns.</content>
@@ -86,6 +87,7 @@ sealed partial class Run
         if (got.Rates != null) CheckMap((JObject)expect["rates"], got.Rates);
         All("actuators", expect, got.Actuators);
         CheckMap(expect, got.Map);
+        CheckErrors(expect, got.ErrorEstimate);
     }
 
     static void CheckTouch(JObject step, JObject expect, Outcome got)
@@ -107,6 +109,20 @@ sealed partial class Run
         if (got.NotTracked != expect["flags"].Any(f => (string)f == "not_tracked")) throw new Missed("not tracked is " + got.NotTracked);
         if (got.NoContact != expect["flags"].Any(f => (string)f == "no_contact")) throw new Missed("no contact is " + got.NoContact);
         if (got.OutOfRange || got.Unsettled) throw new Missed("out of range or unsettled");
+        CheckErrors(expect, got.ErrorEstimate);
+    }
+
+    /// <summary>How wrong the answer says that it may be: what is null is infinite.</summary>
+    static void CheckErrors(JObject expect, ErrorEstimate got)
+    {
+        var due = expect["error_estimate"];
+        if (due == null) return;
+        var found = new[] { got.SedMedian, got.SedP90, got.ForceMedian, got.ForceP90 };
+        for (int k = 0; k < found.Length; k++)
+        {
+            if (due[k].Type != JTokenType.Null) Near("error_estimate " + k, found[k], (double)due[k][0], (double)due[k][1]);
+            else if (!float.IsPositiveInfinity(found[k])) throw new Missed("error_estimate " + k + " is " + found[k] + ", not infinite");
+        }
     }
 
     static void CheckMap(JObject expect, float[] map)

@@ -162,7 +162,7 @@ sealed partial class Run : IDisposable
                 Map = (float[])a.Map.Clone(), Summary = a.HasSummary ? (float[])a.Summary.Clone() : null,
                 Points = a.Points.Take(a.PointCount).ToArray(), Actuators = a.Actuators.Take(a.ActuatorCount).ToArray(),
                 Window = new[] { a.Column, a.Row, a.Width, a.Height }, NotTracked = a.NotTracked, CoarseClock = a.CoarseClock, Rates = a.Rates == null ? null : (float[])a.Rates.Clone(), PointRatesHz = a.PointRatesHz == null ? null : (float[])a.PointRatesHz.Clone(), OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, CutOff = a.CutOff,
-                HasTouch = a.HasTouch, Touch = a.Touch, Finger = a.Finger, Unsettled = a.Unsettled, PressurePa = a.PressurePa == null ? null : (float[])a.PressurePa.Clone(),
+                ErrorEstimate = a.ErrorEstimate, HasTouch = a.HasTouch, Touch = a.Touch, Finger = a.Finger, Unsettled = a.Unsettled, PressurePa = a.PressurePa == null ? null : (float[])a.PressurePa.Clone(),
                 ClientTimeUs = a.ClientTimeUs, TierNumber = a.TierNumber, TotalUs = a.TotalUs, QueueUs = a.QueueUs, InferUs = a.InferUs,
             };
             order.Add(a.Sequence);

@@ -119,7 +119,7 @@ sealed partial class Run : IDisposable
                 Rates = a.RatesHz.Length == 0 ? null : a.RatesHz, PointRatesHz = a.PointRatesHz,
                 Summary = a.Summary, Points = a.Points, Actuators = a.Actuators, PressurePa = a.PressurePa,
                 OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, Unsettled = a.Unsettled, CutOff = a.CutOff,
-                HasTouch = a.HasTouch, Touch = a.Touch, Finger = step == null ? 0 : (int?)step["finger"] ?? 0,
+                ErrorEstimate = a.ErrorEstimate, HasTouch = a.HasTouch, Touch = a.Touch, Finger = step == null ? 0 : (int?)step["finger"] ?? 0,
             };
         }
         catch (PapillaException error)

@@ -106,6 +106,9 @@ class Run {
     if (from.summary) std::memcpy(to.summary.data(), from.summary, sizeof to.summary);
     to.has_touch = from.touch != nullptr;
     if (from.touch) to.touch = touch_of(*from.touch);
+    if (const PapillaErrorEstimate* e = from.error_estimate) {
+      to.error_estimate = {e->sed_median, e->sed_p90, e->force_median, e->force_p90};
+    }
     return to;
   }
 

@@ -90,6 +90,22 @@ void check_list(const char* what, const List& found, const Value& due) {
   for (std::size_t i = 0; i < due.size(); ++i) near(what + std::to_string(i), found[i], due[i]);
 }
 
+/// How wrong the answer says that it may be: what is null is infinite.
+inline void check_errors(const Value& expect, const ErrorEstimate& found) {
+  if (!expect.has("error_estimate")) return;
+  const Value& due = expect["error_estimate"];
+  const float numbers[] = {found.sed_median, found.sed_p90, found.force_median, found.force_p90};
+  must(due.size() == std::size(numbers), "error_estimate: another number of values");
+  for (std::size_t i = 0; i < due.size(); ++i) {
+    const std::string what = "error_estimate" + std::to_string(i);
+    if (due[i].is_null()) {
+      must(numbers[i] == std::numeric_limits<float>::infinity(), what + " is not infinite");
+    } else {
+      near(what, numbers[i], due[i]);
+    }
+  }
+}
+
 template <class At>
 void check_map(const Value& expect, const At& at) {
   double sum = 0.0, top = 0.0;
@@ -163,6 +179,7 @@ inline void check_answer(const Value& expect, const Answer& answer) {
     must(answer.rates_hz.empty(), "the answer carries rates");
   }
   if (expect.has("actuators")) check_list("actuators", answer.actuators, expect["actuators"]);
+  check_errors(expect, answer.error_estimate);
 }
 
 inline void check_touch(const Value& expect, const Answer& answer, std::uint8_t finger) {
@@ -186,4 +203,5 @@ inline void check_touch(const Value& expect, const Answer& answer, std::uint8_t 
   must(answer.no_contact == (expect["flags"].size() > 0), "no_contact is another");
   must(answer.not_tracked == (expect["flags"].size() == 2), "not_tracked is another");
   must(!answer.out_of_range && !answer.unsettled, "out of range or unsettled");
+  check_errors(expect, answer.error_estimate);
 }

@@ -6,6 +6,7 @@ Sessions are driven through `Session`, which drives `AsyncSession`.
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import time
@@ -64,6 +65,16 @@ def check_list(what: str, found: Any, due: list[list[float]]) -> None:
         near(f"{what}[{number}]", float(value), pair)
 
 
+def check_errors(expect: Step, answer: Answer) -> None:
+    """How wrong the answer says that it may be: what is `null` is infinite."""
+    estimate = answer.error_estimate
+    for name, found, due in zip(estimate._fields, estimate, expect["error_estimate"], strict=True):
+        if due is None:
+            must(found == math.inf, f"{name} is {found}, infinity is due")
+        else:
+            near(name, found, due)
+
+
 def check_map(expect: Step, map_: Map) -> None:
     for row, column, value, tolerance in expect.get("pixels", []):
         near(f"pixel {row}, {column}", float(map_[row, column]), [value, tolerance])
@@ -114,6 +125,8 @@ def check_answer(expect: Step, answer: Answer) -> None:
             must(answer.rates_hz is None, "the answer carries rates")
         except NotCarried as error:
             must(error.member == "rates_hz", f"{error}")
+    if "error_estimate" in expect:
+        check_errors(expect, answer)
 
 
 def check_touch(step: Step, answer: Answer) -> None:
@@ -133,6 +146,8 @@ def check_touch(step: Step, answer: Answer) -> None:
     for name in ("no_contact", "not_tracked"):
         must(getattr(answer, name) == (name in expect["flags"]), name)
     must(not answer.out_of_range and not answer.unsettled, f"{answer}")
+    if "error_estimate" in expect:
+        check_errors(expect, answer)
 
 
 CONVENTIONS = {

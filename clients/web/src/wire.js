@@ -258,7 +258,7 @@ export class Answer {
     const map = sections.find((s) => s.name === 'map');
     const rates = sections.find((s) => s.name === 'rates');
     return {
-      errorEstimate: of('error_estimate'), summary: of('summary'), points: of('points'), pointRatesHz: of('point_rates'), actuators: of('actuators'),
+      errorEstimate: of('error_estimate') ?? new Float32Array(4).fill(Infinity), summary: of('summary'), points: of('points'), pointRatesHz: of('point_rates'), actuators: of('actuators'),
       spikes: sections.find((s) => s.name === 'spikes') ?? null,
       mapOffset: map ? map.offset : -1, ratesOffset: rates ? rates.offset : -1, rates: rates ? new Float32Array(MAP_LEN) : null,
     };
@@ -301,7 +301,7 @@ export class Answer {
    * @param {number} bytes length of the message
    */
   readBody(views, bytes) {
-    if (views.errorEstimate) this.errorEstimate = views.errorEstimate;
+    this.errorEstimate = views.errorEstimate;
     this.summary = views.summary;
     this.points = views.points;
     this.pointRatesHz = views.pointRatesHz;

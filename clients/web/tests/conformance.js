@@ -57,6 +57,16 @@ function allNear(what, found, due) {
   due.forEach((pair, n) => near(`${what}[${n}]`, found[n], pair));
 }
 
+/** How wrong the answer says that it may be: what is null is infinite. @param {Step} expect @param {Float32Array} found */
+function checkErrors({ error_estimate: due }, found) {
+  if (!due) return;
+  same('numbers of error_estimate', found.length, due.length);
+  due.forEach((/** @type {number[] | null} */ pair, /** @type {number} */ n) => {
+    if (pair) near(`error_estimate[${n}]`, found[n], pair);
+    else if (found[n] !== Infinity) throw new Error(`error_estimate[${n}] is ${found[n]}, not infinite`);
+  });
+}
+
 /** @param {Step} expect @param {Float32Array} map */
 function checkMap(expect, map) {
   for (const [row, column, value, tolerance] of expect.pixels ?? []) near(`pixel (${row}, ${column})`, map[row * SIDE_PX + column], [value, tolerance]);
@@ -156,9 +166,9 @@ class Runner {
   /** @param {import('../papilla.js').Answer} answer */
   keep(answer) {
     if (this.outcomes.has(answer.sequence)) throw new Error(`frame ${answer.sequence} has two outcomes`);
-    const { map, summary, points, pointRatesHz, rates, actuators, ...rest } = answer;
+    const { map, summary, points, pointRatesHz, rates, actuators, errorEstimate, ...rest } = answer;
     const copy = (/** @type {Float32Array | null} */ values) => (values ? Float32Array.from(values) : null);
-    this.outcomes.set(answer.sequence, { ...rest, map: copy(map), summary: copy(summary), points: copy(points), pointRatesHz: copy(pointRatesHz), rates: copy(rates), actuators: copy(actuators) });
+    this.outcomes.set(answer.sequence, { ...rest, map: copy(map), summary: copy(summary), points: copy(points), pointRatesHz: copy(pointRatesHz), rates: copy(rates), actuators: copy(actuators), errorEstimate: copy(errorEstimate) });
     this.order.push(answer.sequence);
   }
 
@@ -210,6 +220,7 @@ class Runner {
     if (expect.map === false) same('samples', outcome.width * outcome.height, 0);
     for (const section of ['summary', 'points', 'actuators']) if (expect[section]) allNear(section, outcome[section], expect[section]);
     checkMap(expect, outcome.map);
+    checkErrors(expect, outcome.errorEstimate);
   }
 
   /** @param {string} what */
@@ -314,7 +325,8 @@ class Runner {
   async announce(wire, expect) {
     this.hand?.close();
     try {
-      this.hand = await Hand.connect(this.url, wire, undefined, { timeoutMs: this.patienceMs });
+      // As above: a hand by itself asks for no map.
+      this.hand = await Hand.connect(this.url, { map: true, ...wire }, undefined, { timeoutMs: this.patienceMs });
     } catch (error) {
       return this.refused(expect, error);
     }
@@ -382,6 +394,7 @@ class Runner {
     if (expect.pressure_sum) near('pressure', /** @type {Float32Array} */ (answer.pressurePa).reduce((sum, value) => sum + value, 0), expect.pressure_sum);
     same('flags', [...(answer.noContact ? ['no_contact'] : []), ...(answer.notTracked ? ['not_tracked'] : [])], expect.flags);
     same('odd flags', [answer.outOfRange, answer.unsettled], [false, false]);
+    checkErrors(expect, answer.errorEstimate);
     return answer;
   }
 

@@ -31,9 +31,8 @@ fn main() -> anyhow::Result<()> {
             })
         }
         ["--contact-model", path] => {
-            let bytes = ContactRecorder::new(models)?.file()?;
             // Several clients are tested at once, and each has it written anew.
-            atomic::write_changed(Path::new(path), &bytes)?;
+            atomic::write_changed(Path::new(path), ContactRecorder::new(models)?.file())?;
             println!("wrote {path}");
             Ok(())
         }

@@ -1,5 +1,6 @@
-//! Contact as the script expects it (`proto/conformance-contact.json`): the skin of the shipped finger
-//! on a half-space, so that no FE is needed to make the model.
+//! Contact as the scripts expect it: of `proto/conformance-contact.json` the skin of the shipped finger
+//! on a half-space, so that no FE is needed to make the model; of `proto/conformance.json` the contact
+//! model that ships.
 
 use std::{path::Path, sync::Arc};
 
@@ -49,13 +50,14 @@ const TOLERANCES: [(f64, f64); 15] = [
 /// The finger and, in a case, its solvers.
 pub struct ContactRecorder {
     atlas: Atlas,
-    header: Header,
-    arrays: Arrays,
+    file: Vec<u8>,
     model: Arc<ContactModel>,
     pixels: Arc<PixelSkin>,
+    sha256: String,
 }
 
-struct Hand {
+/// The fingers of a case.
+pub(super) struct Hand {
     objects: Vec<AnnouncedObject>,
     has_force: bool,
     /// Of each finger, where the method is on pixels.
@@ -65,16 +67,35 @@ struct Hand {
     /// Whether a frame of gaps was solved: things move from it on.
     has_frame: bool,
     solvers: Vec<Solver>,
+    /// Size of the force (N) and centre of pressure (mm) of each finger's last frame.
+    felt: Vec<(f64, [f64; 3])>,
+}
+
+/// What contact on pixels found of a finger.
+pub(super) struct Pressed<'a> {
+    pub(super) map_pa: &'a [f32],
+    /// Size of the force.
+    pub(super) force_n: f64,
+    /// Centre of pressure.
+    pub(super) centre_mm: [f64; 3],
+}
+
+impl Hand {
+    /// The last frame of a finger; none if the method is not on pixels.
+    pub(super) fn pressed(&self, finger: usize) -> Option<Pressed<'_>> {
+        let (map_pa, (force_n, centre_mm)) =
+            (self.pixels.get(finger)?.map_pa(), *self.felt.get(finger)?);
+        Some(Pressed { map_pa, force_n, centre_mm })
+    }
 }
 
 impl ContactRecorder {
-    /// Of the atlas in the folder of models.
+    /// The half-space of the atlas in the folder of models.
     ///
     /// # Errors
     /// The atlas is missing or damaged.
     pub fn new(folder: &Path) -> Result<Self, ConformanceError> {
-        let text = String::from_utf8_lossy(&read(folder.join("atlas.json"))?).into_owned();
-        let atlas = Atlas::from_json(&text)?;
+        let atlas = atlas(folder)?;
         let skin = &atlas.patch(Patch::Skin).positions_mm;
         let (normals, areas) = normals_and_areas(skin, atlas.triangles());
         let header = Header {
@@ -90,19 +111,35 @@ impl ContactRecorder {
         let triangles = atlas.triangles().as_flattened().to_vec();
         let positions = skin.as_flattened().to_vec();
         let arrays = Arrays::half_space(positions, normals, areas, triangles, MODULUS_MPA);
+        Self::of(atlas, arrays.to_bytes(&header)?)
+    }
+
+    /// The contact model in the folder of models.
+    ///
+    /// # Errors
+    /// The atlas or the contact model is missing or damaged.
+    pub(super) fn shipped(folder: &Path) -> Result<Self, ConformanceError> {
+        Self::of(atlas(folder)?, read(folder.join("finger.contact"))?)
+    }
+
+    fn of(atlas: Atlas, file: Vec<u8>) -> Result<Self, ConformanceError> {
         // As the service reads it.
-        let model = Arc::new(ContactModel::read(&arrays.to_bytes(&header)?)?);
+        let model = Arc::new(ContactModel::read(&file)?);
         let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
         let pixels = PixelSkin::new(&model, &atlas, raster).ok_or(ConformanceError::Layers)?;
-        Ok(Self { atlas, header, arrays, model, pixels: Arc::new(pixels) })
+        let sha256 = papilla_dataset::sha256_hex(&file);
+        Ok(Self { atlas, file, model, pixels: Arc::new(pixels), sha256 })
     }
 
     /// The contact model that the service is to be started with.
-    ///
-    /// # Errors
-    /// [`ConformanceError::Contact`].
-    pub fn file(&self) -> Result<Vec<u8>, ConformanceError> {
-        Ok(self.arrays.to_bytes(&self.header)?)
+    #[must_use]
+    pub fn file(&self) -> &[u8] {
+        &self.file
+    }
+
+    /// SHA-256 of that file.
+    pub(super) fn sha256(&self) -> &str {
+        &self.sha256
     }
 
     /// Writes what is expected into every step.
@@ -125,7 +162,8 @@ impl ContactRecorder {
         Ok(())
     }
 
-    fn step(&self, step: &mut Value, hand: &mut Option<Hand>) -> Result<(), String> {
+    /// Writes what is expected into one step.
+    pub(super) fn step(&self, step: &mut Value, hand: &mut Option<Hand>) -> Result<(), String> {
         let refused = step["expect"]["status"].as_str().is_some_and(|status| status != "ok");
         match step["do"].as_str() {
             Some(_) if refused => {}
@@ -202,6 +240,7 @@ impl ContactRecorder {
             pixels: pixels.unwrap_or_default(),
             friction: hello.friction.unwrap_or(0.0),
             has_frame: false,
+            felt: vec![(0.0, [0.0; 3]); fingers.len()],
             solvers,
         })
     }
@@ -256,6 +295,7 @@ impl ContactRecorder {
         let travel_mm = solved.map_err(|error| error.to_string())?;
         let ([fx, fy, fz], [tx, ty, tz], [cx, cy, cz]) =
             (out.force_n, out.torque_n_mm, out.centre_mm);
+        hand.felt[finger] = (fx.hypot(fy).hypot(fz), out.centre_mm);
         let at_vertices = || out.pressure_pa.iter().copied().fold(0.0, f32::max);
         let most = hand.pixels.get(finger).map_or_else(at_vertices, PixelContact::peak_pa);
         let stiffness = out.stiffness_n_per_mm.unwrap_or(0.0);
@@ -280,6 +320,11 @@ impl ContactRecorder {
         ];
         Ok((numbers, out.pressure_pa))
     }
+}
+
+fn atlas(folder: &Path) -> Result<Atlas, ConformanceError> {
+    let text = String::from_utf8_lossy(&read(folder.join("atlas.json"))?).into_owned();
+    Ok(Atlas::from_json(&text)?)
 }
 
 /// The method that a session of this hello has: the one that it names, or else pixels where they can

@@ -6,6 +6,7 @@
 mod contact;
 mod due;
 mod engines;
+mod errors;
 mod finger;
 pub mod inputs;
 mod print;
@@ -21,6 +22,8 @@ use papilla_engine::Card;
 use papilla_proto::{
     Hello, MAP_LEN,
     atlas::{Atlas, AtlasError, Patch, Raster},
+    contact::Input,
+    input_statistics::PressedCells,
 };
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -28,7 +31,9 @@ use serde_json::{Value, json};
 pub use contact::{ContactRecorder, depth};
 pub use print::print;
 
+use contact::Hand;
 use due::Due;
+use errors::Errors;
 use finger::Surface;
 use inputs::{Contact, Pressure, Vertices};
 use session::Session;
@@ -73,6 +78,9 @@ pub enum ConformanceError {
 struct Tier {
     session: Box<dyn papilla_engine::Session>,
     pressure_max_pa: f32,
+    onnx_sha256: String,
+    /// What the training pressed; none if the network was not trained on maps.
+    pressed: Option<PressedCells>,
 }
 
 impl Tier {
@@ -93,6 +101,16 @@ pub struct Recorder {
     skin: Surface,
     interface: Surface,
     tiers: HashMap<String, Tier>,
+    errors: Errors,
+    /// With the contact model that ships; loaded by the first case of poses.
+    contact: Option<ContactRecorder>,
+}
+
+/// The session of a case, and the solvers of its fingers if it sends poses.
+#[derive(Default)]
+struct Open {
+    session: Option<Session>,
+    hand: Option<Hand>,
 }
 
 fn read(path: PathBuf) -> Result<Vec<u8>, ConformanceError> {
@@ -109,7 +127,7 @@ impl Recorder {
     /// With the models in `folder`.
     ///
     /// # Errors
-    /// The atlas is missing or damaged.
+    /// The atlas or the laws of errors are missing or damaged.
     pub fn new(folder: &Path) -> Result<Self, ConformanceError> {
         let text = String::from_utf8_lossy(&read(folder.join("atlas.json"))?).into_owned();
         let atlas = Atlas::from_json(&text)?;
@@ -122,6 +140,8 @@ impl Recorder {
             raster,
             atlas,
             tiers: HashMap::new(),
+            errors: Errors::read(folder)?,
+            contact: None,
         })
     }
 
@@ -135,9 +155,9 @@ impl Recorder {
         let cases = file["cases"].as_array_mut().into_iter().flatten();
         for case in cases {
             let name = case["name"].as_str().unwrap_or_default().to_owned();
-            let mut session = None;
+            let mut open = Open::default();
             for (number, step) in case["steps"].as_array_mut().into_iter().flatten().enumerate() {
-                self.step(step, &mut session).map_err(|reason| ConformanceError::Step {
+                self.step(step, &mut open).map_err(|reason| ConformanceError::Step {
                     case: name.clone(),
                     step: number,
                     reason,
@@ -147,21 +167,35 @@ impl Recorder {
         Ok(())
     }
 
-    fn step(&mut self, step: &mut Value, session: &mut Option<Session>) -> Result<(), String> {
+    fn step(&mut self, step: &mut Value, open: &mut Open) -> Result<(), String> {
         let refused = step["expect"]["status"].as_str().is_some_and(|status| status != "ok");
         match step["do"].as_str() {
             Some("hello") if !refused => {
                 let hello: Hello = member(step, "hello")?;
-                *session = Some(Session::new(hello)?);
+                if hello.input == Some(Input::Objects) {
+                    self.contact()?.step(step, &mut open.hand)?;
+                }
+                open.session = Some(Session::new(hello)?);
             }
             Some("frame") if !refused => {
-                let session = session.as_mut().ok_or("a frame without a hello")?;
+                let session = open.session.as_mut().ok_or("a frame without a hello")?;
                 let due = self.frame(step, session, 1.0)?;
                 due.fill(&mut step["expect"]);
+                if asks_for_error(step) {
+                    step["expect"]["error_estimate"] = self.error_of_map(step, session)?;
+                }
+            }
+            Some("touch") => {
+                let session = open.session.as_ref().ok_or("a touch without a hello")?;
+                self.contact()?.step(step, &mut open.hand)?;
+                if asks_for_error(step) {
+                    let error = self.error_of_touch(step, session, open.hand.as_ref())?;
+                    step["expect"]["error_estimate"] = error;
+                }
             }
             Some("burst") => {
                 // The last frame is the whole input.
-                let session = session.as_mut().ok_or("a burst without a hello")?;
+                let session = open.session.as_mut().ok_or("a burst without a hello")?;
                 let due = self.frame(step, session, 1.0)?;
                 due.fill(&mut step["expect"]["newest"]);
             }
@@ -207,7 +241,51 @@ impl Recorder {
         session.due(&answer, &sent_pa, (&self.skin, &self.interface))
     }
 
+    /// How wrong the answer to a map is likely to be; an answer with a flag states nothing.
+    fn error_of_map(&mut self, step: &Value, session: &Session) -> Result<Value, String> {
+        if !session.tells_error() || is_flagged(step) {
+            return Ok(errors::not_stated());
+        }
+        let input: Pressure = member(step, "pressure")?;
+        self.load(&session.tier)?;
+        let tier = self.tiers.get_mut(&session.tier).ok_or("no such tier")?;
+        self.errors.of_map(tier, &input.draw(1.0, None))
+    }
+
+    /// The same of an answer to poses.
+    fn error_of_touch(
+        &mut self,
+        step: &Value,
+        session: &Session,
+        hand: Option<&Hand>,
+    ) -> Result<Value, String> {
+        if !session.tells_error() || is_flagged(step) {
+            return Ok(errors::not_stated());
+        }
+        let finger: Option<usize> = member(step, "finger")?;
+        let found = hand.and_then(|hand| hand.pressed(finger.unwrap_or(0)));
+        let found = found.ok_or("an error is told of contact on pixels alone")?;
+        self.load(&session.tier)?;
+        let tier = self.tiers.get_mut(&session.tier).ok_or("no such tier")?;
+        let contact = self.contact.as_ref().ok_or("no contact model")?;
+        self.errors.of_contact(tier, contact.sha256(), &found)
+    }
+
+    /// What contact is, by the contact model that ships.
+    fn contact(&mut self) -> Result<&ContactRecorder, String> {
+        if self.contact.is_none() {
+            let shipped = ContactRecorder::shipped(&self.folder);
+            self.contact = Some(shipped.map_err(|error| error.to_string())?);
+        }
+        self.contact.as_ref().ok_or_else(|| "no contact model".to_owned())
+    }
+
     fn tier(&mut self, name: &str) -> Result<&mut Tier, String> {
+        self.load(name)?;
+        self.tiers.get_mut(name).ok_or_else(|| format!("no tier {name}"))
+    }
+
+    fn load(&mut self, name: &str) -> Result<(), String> {
         if !self.tiers.contains_key(name) {
             let load = || {
                 let onnx = read(self.folder.join(format!("{name}.onnx")))?;
@@ -217,13 +295,25 @@ impl Recorder {
                 Ok::<_, ConformanceError>(Tier {
                     session: model.session()?,
                     pressure_max_pa: model.info().pressure_max_pa,
+                    pressed: card.input_statistics_max.map(|most| most.cells),
+                    onnx_sha256: card.onnx_sha256,
                 })
             };
             let tier = load().map_err(|error| error.to_string())?;
             self.tiers.insert(name.to_owned(), tier);
         }
-        self.tiers.get_mut(name).ok_or_else(|| format!("no tier {name}"))
+        Ok(())
     }
+}
+
+/// Whether a step asks how wrong its answer is likely to be.
+fn asks_for_error(step: &Value) -> bool {
+    step["expect"].get("error_estimate").is_some()
+}
+
+/// Whether the answer has a flag.
+fn is_flagged(step: &Value) -> bool {
+    step["expect"]["flags"].as_array().is_some_and(|flags| !flags.is_empty())
 }
 
 /// A value to seven digits and its tolerance to two.

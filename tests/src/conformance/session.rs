@@ -45,6 +45,11 @@ impl Session {
         Ok(Self { hello, tier, effects, sent: Vec::new(), stress: None })
     }
 
+    /// Whether answers tell how wrong they are likely to be.
+    pub(super) fn tells_error(&self) -> bool {
+        self.hello.error_estimate == Some(true)
+    }
+
     fn has(&self, effect: RuntimeEffect) -> bool {
         self.effects.contains(&effect)
     }

@@ -7,7 +7,7 @@ fn root() -> PathBuf {
 }
 
 /// Members whose lists of numbers end in value and tolerance.
-const MEASURED: [&str; 11] = [
+const MEASURED: [&str; 12] = [
     "pixels",
     "sum",
     "max",
@@ -19,6 +19,7 @@ const MEASURED: [&str; 11] = [
     "pressure_sum",
     "torque_n_m",
     "centre",
+    "error_estimate",
 ];
 
 /// Compares recorded numbers; returns how many there were.
@@ -36,7 +37,7 @@ fn compare(path: &str, measured: bool, found: &Value, due: &Value) -> usize {
         }
         (Value::Array(found), Value::Array(due)) => {
             assert_eq!(found.len(), due.len(), "{path}: another length");
-            if !measured || found.iter().any(Value::is_array) {
+            if !measured || found.iter().any(|part| part.is_array() || part.is_null()) {
                 let parts = found.iter().zip(due).enumerate();
                 return parts
                     .map(|(i, (f, d))| compare(&format!("{path}[{i}]"), measured, f, d))
@@ -87,7 +88,7 @@ fn the_committed_contact_script_is_what_the_solver_says() {
     let numbers = compare("", false, &committed, &recorded);
     assert!(numbers > 200, "only {numbers} numbers are expected in the whole script");
     assert_eq!(print(&committed), text, "not as `conformance-record` prints it");
-    assert!(recorder.file().unwrap().starts_with(b"papilla contact model"));
+    assert!(recorder.file().starts_with(b"papilla contact model"));
 }
 
 #[test]

@@ -255,6 +255,22 @@ func check(expect, outcome):
 		check_map(expect.rates, session.rates_hz_of(outcome))
 	if expect.has("pixels") or expect.has("sum") or expect.has("max"):
 		check_map(expect, session.map_of(outcome))
+	check_errors(expect, outcome)
+
+
+# How wrong the answer says that it may be: what is null is infinite. Without the section there is no member.
+func check_errors(expect, outcome):
+	if not expect.has("error_estimate"):
+		return
+	var found = outcome.get("error_estimate", {})
+	var due = expect.error_estimate
+	var names = ["sed_median", "sed_p90", "force_median", "force_p90"]
+	for k in names.size():
+		var value = found.get(names[k], INF)
+		if due[k] != null:
+			near(names[k], value, due[k][0], due[k][1])
+		elif value != INF:
+			fail("%s is %s, not infinite" % [names[k], value])
 
 
 func check_map(expect, map):
@@ -476,6 +492,7 @@ func check_touch(step, expect, sequence):
 	same("not_tracked", outcome.not_tracked, expect.flags.has("not_tracked"))
 	if outcome.out_of_range or outcome.unsettled:
 		fail("out of range or unsettled")
+	check_errors(expect, outcome)
 
 
 func step_contacts(step, expect):

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail, ensure};
 use papilla_client::{Answer, Status};
-use papilla_proto::{MAP_SIDE_PX, Problem};
+use papilla_proto::{ErrorEstimate, MAP_SIDE_PX, Problem};
 use serde_json::{Value, json};
 
 fn near(what: &str, found: f64, due: f64, tolerance: f64) -> Result<()> {
@@ -22,6 +22,22 @@ pub(crate) fn check_list(what: &str, found: &[f32], due: &Value) -> Result<()> {
     ensure!(found.len() == due.len(), "{what}: {} values, {} are due", found.len(), due.len());
     for (i, (&found, due)) in found.iter().zip(due).enumerate() {
         check_pair(&format!("{what} {i}"), f64::from(found), due)?;
+    }
+    Ok(())
+}
+
+/// Compares how wrong an answer says that it may be: what is `null` is infinite.
+fn check_errors(expect: &Value, answer: &Answer) -> Result<()> {
+    let Some(due) = expect["error_estimate"].as_array() else { return Ok(()) };
+    let ErrorEstimate { sed, force } = answer.error_estimate;
+    let found = [sed.median, sed.p90, force.median, force.p90];
+    ensure!(due.len() == found.len(), "{} errors are due", due.len());
+    for (i, (found, due)) in found.into_iter().zip(due).enumerate() {
+        let what = format!("error_estimate {i}");
+        match due {
+            Value::Null => ensure!(found == f32::INFINITY, "{what} is {found}, infinity is due"),
+            pair => check_pair(&what, f64::from(found), pair)?,
+        }
     }
     Ok(())
 }
@@ -113,7 +129,7 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
             check_list(name, found, due)?;
         }
     }
-    Ok(())
+    check_errors(expect, answer)
 }
 
 pub(crate) fn check_touch(expect: &Value, answer: &Answer, finger: u8) -> Result<()> {
@@ -135,5 +151,5 @@ pub(crate) fn check_touch(expect: &Value, answer: &Answer, finger: u8) -> Result
         .collect();
     ensure!(expect["flags"] == json!(flags), "flags are {flags:?}");
     ensure!(!answer.out_of_range && !answer.unsettled, "{answer:?}");
-    Ok(())
+    check_errors(expect, answer)
 }
