@@ -46,7 +46,10 @@ fn help_and_pages_say_what_a_finger_takes() {
     let figure = format!("{} MiB", papilla_session_contact::FINGER_BYTES_MAX >> 20);
     assert!(help.contains(&format!("of up to {figure} each")), "{help}");
     for (page, line) in [
-        ("docs/reference/settings.md", format!("fingers of all sessions, up to {figure} each")),
+        (
+            "docs/reference/settings.md",
+            format!("fingers of all sessions together, up to {figure} each"),
+        ),
         ("docs/guides/operating.md", format!("| a finger | {figure} ")),
     ] {
         let path = format!("{}/../{page}", env!("CARGO_MANIFEST_DIR"));
