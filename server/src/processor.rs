@@ -42,7 +42,7 @@ impl Vectors {
             Self::Narrow => {
                 "neither AVX2 nor FMA: answers are right, but each takes several times as long as \
                  the shipped times; keep the calibration on, and give sessions longer budgets or \
-                 the tier pico"
+                 the tiers nano and nano-maps"
             }
             Self::Other => "no x86-64; its own vectors",
         }

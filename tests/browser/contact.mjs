@@ -172,7 +172,7 @@ test('an answer says how wrong it is likely to be, where that is known', async (
   await floor(/^below [\d.]+ k?J\/m³, the error expected of the first answer, nothing is drawn$/);
   const [typical, bound, wide] = await page.evaluate(() => ['b', 'i', '.sure-bar'].map((name) => document.querySelector(`#sed-sure ${name}`).closest('.sure').querySelector(name).getBoundingClientRect().width));
   assert.ok(typical > 0 && typical < bound && bound <= wide, `${typical} ${bound} ${wide}`);
-  await page.selectOption('#with', 'tier:pico');
+  await page.selectOption('#with', 'tier:small');
   await said(/^expected error/, 'other-sure');
   await page.selectOption('#with', '');
   await chooseRadio('shape', 'wedge');
@@ -252,7 +252,7 @@ test('a link that names no model leads to the default, and one by budget to the 
 });
 
 test('a second model answers the same contact, and the difference is of that pair', async () => {
-  await page.selectOption('#with', 'tier:pico');
+  await page.selectOption('#with', 'tier:small');
   await settled();
   await until(() => globalThis.papilla.pictures.pair.apart > 0 && / % apart/.test(document.getElementById('apart').textContent));
   const { first, second, difference, apart, pixels } = await page.evaluate(() => {
@@ -302,8 +302,8 @@ test('the second answer is found from poses as the first one is, and states the 
   await page.selectOption('#method', '');
   await comparedBy('small', 'pixels');
   await page.selectOption('#with', 'method:springs');
-  await page.selectOption('#tier', 'pico');
-  await until(() => globalThis.papilla.comparison.session.ready?.tier === 'pico');
+  await page.selectOption('#tier', 'large');
+  await until(() => globalThis.papilla.comparison.session.ready?.tier === 'large');
   // A network that did not learn the pressure of contact states no error, and the page says why.
   await page.selectOption('#with', 'tier:small-maps');
   await until(() => /unknown, as it learnt maps of pressure$/.test(document.getElementById('other-sure').textContent));
@@ -371,7 +371,7 @@ test('friction is of the object, and shear comes with it', async () => {
 });
 
 test('friction that came with the switch of shear goes with it, and the second answer has shear too', async () => {
-  await page.selectOption('#with', 'tier:pico');
+  await page.selectOption('#with', 'tier:small');
   await page.check('#effect-shear_energy');
   await until(() => globalThis.papilla.comparison.session.ready?.session_effects.includes('shear_energy'));
   await until(() => /unknown with friction or creep$/.test(document.getElementById('other-sure').textContent));

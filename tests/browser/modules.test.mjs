@@ -288,7 +288,7 @@ function twoWorlds() {
   return {
     default: 'small', default_for_pressure: 'small-maps', judged_on: 'heldout-presses', methods: [{ name: 'pixels', contact_us: 8000 }],
     tiers: [
-      tier('form', 'fe', 0.2, [0.5, 0.5], 'closed_form'), tier('pico', 'both', 1, [0.17, 0.16]), tier('small', 'contact', 4, [0.15, 0.09]), tier('large', 'contact', 20, [0.14, 0.08]),
+      tier('form', 'fe', 0.2, [0.5, 0.5], 'closed_form'), tier('tiny', 'both', 1, [0.17, 0.16]), tier('small', 'contact', 4, [0.15, 0.09]), tier('large', 'contact', 20, [0.14, 0.08]),
       tier('small-maps', 'fe', 4, [0.08, 0.14]), tier('large-maps', 'fe', 40, [0.06, 0.13]), tier('mine', 'contact', 3, [0.2, 0.1]),
     ],
   };
@@ -312,7 +312,7 @@ test('another input takes the sibling that learnt it, a default a default, and g
   const data = twoWorlds();
   const to = (name, before, now) => tierAfter(data, name, before, now);
   assert.deepEqual(['poses', 'pressure'].map((given) => defaultFor(data, given)), ['small', 'small-maps']);
-  for (const [press, replay] of [['small', 'small-maps'], ['large', 'large-maps'], ['pico', 'pico'], ['form', 'form'], ['mine', 'mine'], ['', '']]) {
+  for (const [press, replay] of [['small', 'small-maps'], ['large', 'large-maps'], ['tiny', 'tiny'], ['form', 'form'], ['mine', 'mine'], ['', '']]) {
     assert.equal(to(press, 'poses', 'pressure'), replay);
     assert.equal(to(replay, 'pressure', 'poses'), press);
   }
@@ -321,13 +321,13 @@ test('another input takes the sibling that learnt it, a default a default, and g
   data.default = 'large';
   assert.deepEqual([to('large', 'poses', 'pressure'), to('small-maps', 'pressure', 'poses')], ['small-maps', 'large'], 'defaults need not be siblings');
   assert.deepEqual([tierFor(data, 'small', 'pressure'), tierFor(data, 'none', 'pressure')], ['small-maps', 'none']);
-  assert.deepEqual(suiting(data.tiers, 'pressure').map(({ name }) => name), ['form', 'pico', 'small-maps', 'large-maps']);
-  assert.deepEqual(suiting(data.tiers, 'poses').map(({ name }) => name), ['form', 'pico', 'small', 'large', 'mine']);
+  assert.deepEqual(suiting(data.tiers, 'pressure').map(({ name }) => name), ['form', 'tiny', 'small-maps', 'large-maps']);
+  assert.deepEqual(suiting(data.tiers, 'poses').map(({ name }) => name), ['form', 'tiny', 'small', 'large', 'mine']);
 });
 
 test('errors, sets and words are those of what is given', () => {
   const data = twoWorlds();
-  const [, pico, small, , maps] = data.tiers;
+  const [, tiny, small, , maps] = data.tiers;
   assert.deepEqual([errorFrom(small, 'poses'), errorFrom(small, 'pressure'), errorFrom({ ...small, relative_l2_median_from_poses: null }, 'poses')], [0.09, 0.15, 0.15]);
   const sets = ['heldout-presses', 'reference', 'poses'];
   assert.deepEqual(['poses', 'pressure'].map((given) => setFor(data, sets, given)), ['poses', 'heldout-presses']);
@@ -337,7 +337,7 @@ test('errors, sets and words are those of what is given', () => {
   const about = aboutSet([{ name: 'poses', samples: 86, about: 'the states of `heldout-presses`, pressed by contact' }], 'poses');
   assert.match(about, /^86 simulations: the states of “new presses, known shapes”, pressed by contact; for poses the service chooses by these/);
   assert.deepEqual(['nano-maps', 'small-maps', 'large-maps', 'small'].map(nameOfTier), ['nano for maps', 'small for maps', 'large for maps', 'small']);
-  assert.deepEqual([suits(small, 'pressure'), suits(small, 'poses'), suits(maps, 'poses'), suits(pico, 'poses'), suits(pico, 'pressure')], [false, true, false, true, true]);
+  assert.deepEqual([suits(small, 'pressure'), suits(small, 'poses'), suits(maps, 'poses'), suits(tiny, 'poses'), suits(tiny, 'pressure')], [false, true, false, true, true]);
   assert.match(aboutTier('small', small, 'pressure'), /^It learnt the pressure that contact finds from poses; here maps/);
   assert.match(aboutTier('small-maps', maps, 'poses'), /^For sessions that give maps of pressure\. It learnt the pressure of finite elements; here contact/);
   assert.deepEqual([aboutTier('small', small, 'poses'), aboutTier('small-maps')], ['', 'For sessions that give maps of pressure.']);

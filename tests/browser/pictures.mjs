@@ -8,7 +8,7 @@ const PATIENCE_MS = 90000;
 /** Answers after which times are medians of many. */
 const ANSWERS = 60;
 const FOLDER = new URL('../../docs/reports/pictures/', import.meta.url);
-const TERMS = 'tier=small&with=tier:pico&budget=500000';
+const TERMS = 'tier=small&with=tier:nano&budget=500000';
 const PICTURES = [
   { name: 'page', hash: `#shape=sphere&size=8&${TERMS}`, viewport: { width: 1440, height: 900 }, scale: 1.5 },
   { name: 'page-hand', hash: `#mode=hand&shape=plate&depth=1.2&${TERMS}`, viewport: { width: 1440, height: 900 }, scale: 1.25, of: '.hand' },

@@ -72,7 +72,7 @@ def test_hold(example):
 
 def test_tradeoff(example):
     found = example("tradeoff")
-    assert {"pico", "small", "small-maps", "large"} <= set(found["names"]) and min(found["times_ms"]) > 0
+    assert {"nano", "small", "small-maps", "large"} <= set(found["names"]) and min(found["times_ms"]) > 0
     of_maps, of_poses = (dict(zip(found["names"], found[of], strict=True)) for of in ("of_maps", "of_poses"))
     # Each errs less from what it learnt than its sibling.
     assert of_maps["small-maps"] < of_maps["small"] and of_poses["small"] < of_poses["small-maps"]

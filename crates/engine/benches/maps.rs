@@ -12,7 +12,7 @@ use papilla_engine::{MAP_LEN, MAP_SIDE_PX, Session, load, load_as_it_stands};
 use std::error::Error;
 use std::time::Instant;
 
-const NETWORKS: [&str; 5] = ["pico", "nano", "small", "large", "large-maps"];
+const NETWORKS: [&str; 4] = ["nano", "small", "large", "large-maps"];
 
 /// Hertz' pressure on an ellipse: middle and half axes in rows and columns, and the peak in Pa.
 struct Contact {

@@ -46,7 +46,7 @@ All models and the solver itself, error against time:
   model-export ladder   --data data --models models --fe out/rungs --out docs/reports
   model-export here     --out out/here
 How wrong each answer is likely to be:
-  model-export calibrate --network pico nano-maps nano small-maps small large large-maps";
+  model-export calibrate --network nano-maps nano small-maps small large large-maps";
 
 /// Parsed command line.
 #[derive(Debug, Parser)]

@@ -33,9 +33,9 @@ the epoch by; the test indentations are not touched.
 
 s1-baseN is the published U-Net on maps (two encoding and two decoding stages, MSE on
 max-normalised maps).
-map-cC-kK-rR[-hH][-p2] works on pixels: C components of strain from a linear map of rank R over the
+map-cC-kK-rR[-hH] works on pixels: C components of strain from a linear map of rank R over the
 whole finger and from convolutions over K by K blocks at three resolutions; SED is the sum of their
-squares. A correction of width H follows; p2: on means of 2 by 2 pixels.
+squares. A correction of width H follows.
 
 Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv and loss.png. Stop it at
 any time: the same command with --resume goes on from the last whole epoch and ends in the same

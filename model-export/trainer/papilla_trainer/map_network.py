@@ -15,9 +15,6 @@ around it, and what the next level adds starts from there. At the finest level i
 
 Skin knows no blocks. So a block's four pixels have the same kernel of (2 K - 1)^2 weights, each
 about itself, and what a level adds to the next is linear between the middles of its pixels.
-
-A network of coarse pixels (``-p2``) works on means of two by two pixels, at a quarter of the cost,
-and interpolates SED between them.
 """
 
 from __future__ import annotations
@@ -38,7 +35,6 @@ PRESSURE_UNIT_PA = 1e4
 SED_UNIT_J_PER_M3 = 100.0
 _NAME = re.compile(
     r"map-c(?P<components>\d+)-k(?P<kernel>\d+)-r(?P<rank>\d+)(?:-h(?P<hidden>\d+))?"
-    r"(?:-p(?P<pixel>\d+))?"
 )
 # Pixels of a block.
 _BLOCK = 4
@@ -53,52 +49,42 @@ class MapSpec:
     """What decides a map network's shape.
 
     ``components``: C; ``kernel``: K, odd; ``rank``: of the global map; ``hidden``: width of
-    the correction (0: none), four times that at the coarsest level; ``pixel``: pixels of the map
-    across one of the network's, 1 or 2.
+    the correction (0: none), four times that at the coarsest level.
     """
 
     components: int
     kernel: int
     rank: int
     hidden: int = 0
-    pixel: int = 1
     kind: str = "map_net"
 
     @property
     def name(self) -> str:
         """The name that `--network` reads."""
         name = f"map-c{self.components}-k{self.kernel}-r{self.rank}"
-        name += f"-h{self.hidden}" if self.hidden else ""
-        return name + (f"-p{self.pixel}" if self.pixel > 1 else "")
+        return name + (f"-h{self.hidden}" if self.hidden else "")
 
     @property
     def sides(self) -> list[int]:
         """Blocks across the map, a level each, the finest first."""
-        count = (_COARSEST // self.pixel).bit_length() - 1
-        return [SIDE_PX // self.pixel >> level for level in range(1, count + 1)]
+        return [SIDE_PX >> level for level in range(1, _COARSEST.bit_length())]
 
     def as_json(self) -> dict[str, Any]:
         """The form that the model's metadata carry."""
-        numbers = asdict(self)
-        if self.pixel == 1:
-            del numbers["pixel"]
-        return numbers
+        return asdict(self)
 
 
 def parse_map_network(name: str) -> MapSpec:
-    """Read ``map-cC-kK-rR[-hH][-p2]``."""
+    """Read ``map-cC-kK-rR[-hH]``."""
     match = _NAME.fullmatch(name)
     if match is None:
         raise UsageError(
-            f"unknown network '{name}': give map-cC-kK-rR[-hH][-p2] (components, blocks across a "
-            "convolution, rank of the global map, width of the correction, coarse pixels), e.g. "
-            "map-c6-k5-r32-h16"
+            f"unknown network '{name}': give map-cC-kK-rR[-hH] (components, blocks across a "
+            "convolution, rank of the global map, width of the correction), e.g. map-c6-k5-r32-h16"
         )
     number = {key: int(value) for key, value in match.groupdict().items() if value is not None}
     if number["kernel"] % 2 == 0 or 0 in number.values():
         raise UsageError(f"--network {name}: K must be odd and no number may be 0")
-    if number.get("pixel", 2) != 2:
-        raise UsageError(f"--network {name}: a coarse pixel is 2 pixels across")
     return MapSpec(**number)
 
 
@@ -219,8 +205,6 @@ class Correction(nn.Module):
 class MapNet(nn.Module):
     """``[N, 1, 224, 224]`` Pa to ``[N, 1, 224, 224]`` J/m3, >= 0."""
 
-    between: Tensor
-
     def __init__(self, spec: MapSpec) -> None:
         super().__init__()
         self.spec = spec
@@ -235,20 +219,15 @@ class MapNet(nn.Module):
         self.corrections = nn.ModuleDict(
             {str(level): Correction(spec, level) for level in corrected}
         )
-        self.register_buffer("between", _between(), persistent=False)
 
     def forward(self, pressure_pa: Tensor) -> Tensor:
         """Maps of pressure to maps of SED, also where the interface is not."""
         pressure = pressure_pa * (1.0 / PRESSURE_UNIT_PA)
-        if self.spec.pixel > 1:
-            pressure = _mean(functional.pixel_unshuffle(pressure, 2))
         blocks = functional.pixel_unshuffle(pressure, 2)
         components = self._components(blocks)
         squares = components * components
         shape = (-1, self.spec.components, _BLOCK, *squares.shape[2:])
         sed = functional.pixel_shuffle(squares.reshape(shape).sum(dim=1), 2)
-        if self.spec.pixel > 1:
-            sed = functional.pixel_shuffle(functional.conv2d(sed, self.between, padding=1), 2)
         return sed * SED_UNIT_J_PER_M3
 
     def _components(self, finest: Tensor) -> Tensor:
@@ -321,7 +300,7 @@ def _taps(kernel: int) -> Tensor:
 
 
 def _between() -> Tensor:
-    """``[4, 1, 3, 3]``: a coarse pixel's four pixels, linear between the middles of its like."""
+    """``[4, 1, 3, 3]``: a pixel's four of half its width, linear between middles of its like."""
     low, high = torch.tensor([0.25, 0.75, 0.0]), torch.tensor([0.0, 0.75, 0.25])
     halves = [torch.outer(y, x) for y in (low, high) for x in (low, high)]
     return torch.stack(halves)[:, None]

@@ -21,7 +21,7 @@ from papilla_trainer.map_network import MapNet, MapSpec, parse_map_network
 from papilla_trainer.serving import served_model
 from papilla_trainer.training import Trainer
 
-NAMES = ("map-c2-k3-r4", "map-c3-k5-r2-h4", "map-c3-k3-r2-h4-p2")
+NAMES = ("map-c2-k3-r4", "map-c3-k5-r2-h4")
 
 
 def build(name: str) -> MapNet:
@@ -44,11 +44,9 @@ def test_names_are_read() -> None:
     for name in NAMES:
         assert parse_map_network(name).name == name
     assert parse_map_network("map-c6-k5-r32-h16") == MapSpec(6, 5, 32, 16)
-    assert parse_map_network("map-c3-k3-r32-h4-p2") == MapSpec(3, 3, 32, 4, pixel=2)
     assert parse_map_network("map-c3-k3-r32").sides == [112, 56, 28]
-    assert parse_map_network("map-c3-k3-r32-p2").sides == [56, 28]
     wrong_names = ("map", "map-c6", "map-c6-k4-r2", "map-c0-k3-r2", "map-c6-k3-r2-h0", "map-k3-c6")
-    for wrong in (*wrong_names, "map-c6-k3-r2-p3", "map-c6-k3-r2-p1"):
+    for wrong in (*wrong_names, "map-c6-k3-r2-p2", "map-c6-k3-r2-h4-p2"):
         with pytest.raises(UsageError, match=r"--network|unknown network"):
             parse_map_network(wrong)
 
@@ -152,8 +150,8 @@ def test_shifts_are_for_maps_and_small() -> None:
 
 
 @torch.no_grad()
-def test_between_coarse_pixels_values_are_linear() -> None:
-    between = build("map-c2-k3-r4-p2").between
+def test_between_the_middles_of_pixels_values_are_linear() -> None:
+    between = build("map-c2-k3-r4").levels[0].get_buffer("between")
     y, x = torch.meshgrid(torch.arange(24.0), torch.arange(24.0), indexing="ij")
     plane = 3.0 * y - 2.0 * x + 100.0
     coarse = functional.avg_pool2d(plane[None, None], 2)

@@ -44,7 +44,7 @@ def command(folder: Path, *arguments: str) -> list[str]:
     return [
         *(os.environ["FE_DATAGEN"], "finger", "teach", str(folder)),
         *("--campaign", str(folder.parent / "tiny.toml"), "--from", str(REPOSITORY / "models")),
-        *("--without-contact", "--network", "pico", "--epochs", "20", "--threads", "1"),
+        *("--without-contact", "--network", "nano", "--epochs", "20", "--threads", "1"),
         *arguments,
     ]
 
@@ -135,7 +135,7 @@ def test_a_finger_gets_a_network_of_its_own(finger: Path) -> None:
         assert begun.wait(60) == 130
     solved = shards(finger)
     assert 1 <= len(solved) < 5
-    assert not (finger / "pico.onnx").exists()
+    assert not (finger / "nano.onnx").exists()
 
     done = teach(finger, "--presses", "5", "--json")
     assert done.returncode == 0, done.stderr
@@ -150,8 +150,8 @@ def test_a_finger_gets_a_network_of_its_own(finger: Path) -> None:
     assert after < 0.8 * before
     assert network["before"]["pose_to_sed"] is None
 
-    shipped = json.loads((REPOSITORY / "models/pico.json").read_text())
-    card = json.loads((finger / "pico.json").read_text())
+    shipped = json.loads((REPOSITORY / "models/nano.json").read_text())
+    card = json.loads((finger / "nano.json").read_text())
     atlas = json.loads((finger / "teach/presses/manifest.json").read_text())["atlas_hash"]
     assert card["atlas_hash"] == atlas != shipped["atlas_hash"]
     assert card["training"]["finger_sha256"] == report["finger_sha256"]
@@ -159,19 +159,19 @@ def test_a_finger_gets_a_network_of_its_own(finger: Path) -> None:
     assert card["metrics"]["relative_l2"]["median"] == pytest.approx(after)
     assert card["pattern_max"]["load_mpa_px"] > 0.0
     index = json.loads((finger / "index.json").read_text())
-    assert (index["default"], index["models"]) == ("pico", ["pico"])
+    assert (index["default"], index["models"]) == ("nano", ["nano"])
     assert not list(finger.rglob("*.partial")) + list(finger.rglob("*.part"))
 
 
 def test_more_presses_keep_those_that_are_solved(finger: Path) -> None:
     first = shards(finger)
-    weights = (finger / "pico.onnx").read_bytes()
+    weights = (finger / "nano.onnx").read_bytes()
     done = teach(finger, "--presses", "6", "--json")
     assert done.returncode == 0, done.stderr
     later = shards(finger)
     assert len(later) == 6
     assert later.items() >= first.items()
-    assert (finger / "pico.onnx").read_bytes() != weights
+    assert (finger / "nano.onnx").read_bytes() != weights
     report = json.loads(done.stdout)
     # What is left of a five is learnt from.
     assert (report["presses"], report["held_out"]) == (6, 1)

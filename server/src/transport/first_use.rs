@@ -121,10 +121,10 @@ mod tests {
     async fn a_wait_ends_in_time_and_the_next_one_finds_what_it_has_begun() {
         let models = tempfile::tempdir().unwrap();
         let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models");
-        for file in ["atlas.json", "pico.onnx", "pico.json", "half-space.onnx", "half-space.json"] {
+        for file in ["atlas.json", "nano.onnx", "nano.json", "half-space.onnx", "half-space.json"] {
             fs::copy(shipped.join(file), models.path().join(file)).unwrap();
         }
-        let index = br#"{"default": "pico", "models": ["pico", "half-space"],
+        let index = br#"{"default": "nano", "models": ["nano", "half-space"],
             "on_demand": ["half-space"]}"#;
         fs::write(models.path().join("index.json"), index).unwrap();
         let config = Config {

@@ -60,7 +60,7 @@ def maps(pressure_pa, **more):
         {"tier": "nano", "effects": ["contact_window"], "answer_sample_type": "u16"},
         {"tier": "nano", "effects": ["spikes", "relaxation"], "map": False},
         {"tier": "nano", "answer_layout": "vertices"},
-        *({"tier": "pico", "sample_type": kind} for kind in ("f16", "u16", "u8")),
+        *({"tier": "small-maps", "sample_type": kind} for kind in ("f16", "u16", "u8")),
     ],
     ids=lambda hello: "-".join(str(value) for value in hello.values()),
 )
@@ -149,10 +149,10 @@ def test_both_sessions_have_the_same_methods():
 def test_new_terms_and_the_end(pressure_pa):
     with papilla.local(tier="nano") as session:
         before = session.render(pressure_pa).sed
-        assert session.renew(tier="pico")["tier"] == "pico" and session.hello == {"tier": "pico"}
+        assert session.renew(tier="small-maps")["tier"] == "small-maps" and session.hello == {"tier": "small-maps"}
         with pytest.raises(papilla.Refused):
             session.renew(effects=["none"])
-        assert session.render(pressure_pa).tier == "pico"
+        assert session.render(pressure_pa).tier == "small-maps"
         assert not np.array_equal(session.render(pressure_pa).sed, before)
     assert not session.connected
     with pytest.raises(papilla.Closed):

@@ -56,9 +56,9 @@ impl Level {
         space: &mut LevelSpace,
         target: &mut Target<'_>,
     ) {
-        space.upsampling.begin(simd, above, Some(&self.mix));
+        space.upsampling.begin(simd, above, &self.mix);
         for row in 0..self.layout.side {
-            space.upsampling.advance(simd, above, Some(&self.mix), row);
+            space.upsampling.advance(simd, above, &self.mix, row);
             let columns = if self.correction.is_none() { target.columns(row) } else { None };
             let columns = columns.unwrap_or(0..self.layout.side);
             let bits = blocks.near(row) & bits(&columns);

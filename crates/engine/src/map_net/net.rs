@@ -8,13 +8,12 @@ use super::pixels::{Pixels, Target};
 use super::pressures::{Layout, Pressures};
 use super::reach::Reach;
 use super::sums::{GROUP, MARGIN};
-use super::upsampling::{Above, Upsampling, mix};
+use super::upsampling::{Above, mix};
 use pulp::{Arch, Simd, WithSimd};
 
 #[derive(Debug)]
 pub(super) struct Net {
     unit: f32,
-    pixel: usize,
     components: usize,
     /// The finest first.
     levels: Vec<Level>,
@@ -30,7 +29,7 @@ impl Net {
         let coarsest = parts.levels[parts.levels.len() - 1].side;
         let reach = Reach::new(parts.rank, &parts.reach_in, &parts.reach_out, coarsest);
         let pixels = Pixels::new(parts.mask.clone());
-        Self { unit: parts.unit, pixel: parts.pixel, components, levels, reach, pixels }
+        Self { unit: parts.unit, components, levels, reach, pixels }
     }
 }
 
@@ -57,9 +56,6 @@ pub(super) struct Workspace {
     reach: Vec<f32>,
     /// Densities of a row of blocks, `[4, n + MARGIN]`.
     densities: Vec<f32>,
-    /// If the network's pixels are 2 x 2 of the map's: their densities, and the interpolation
-    /// between them.
-    coarse: Option<(Above, Upsampling)>,
 }
 
 impl Workspace {
@@ -67,12 +63,11 @@ impl Workspace {
         let layouts: Vec<_> = net.levels.iter().map(|level| level.layout).collect();
         let side = 2 * layouts[0].side;
         Self {
-            pressures: Pressures::new(net.unit, net.pixel, &layouts),
+            pressures: Pressures::new(net.unit, &layouts),
             above: layouts.iter().map(|layout| Above::new(net.components, layout.side)).collect(),
             levels: net.levels.iter().map(LevelSpace::new).collect(),
             reach: net.reach.space(),
             densities: vec![0.0; GROUP * (side + MARGIN)],
-            coarse: (net.pixel == 2).then(|| (Above::new(1, side), Upsampling::new(1, side))),
         }
     }
 }
@@ -100,7 +95,7 @@ impl WithSimd for Work<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { net, space, pressure_pa, sed_j_per_m3, adds } = self;
-        let Workspace { pressures, above, levels, reach, densities, coarse } = space;
+        let Workspace { pressures, above, levels, reach, densities } = space;
         if !pressures.take(pressure_pa) {
             // The network has no bias, so without pressure its answer is zero.
             if !adds {
@@ -112,10 +107,9 @@ impl WithSimd for Work<'_> {
         net.reach.write(simd, pressures.coarsest(), reach, &mut above[last]);
         for index in (0..=last).rev() {
             let (finer, its) = above.split_at_mut(index);
-            let mut target = match (finer.last_mut(), &mut *coarse) {
-                (Some(next), _) => Target::Next(next),
-                (None, Some((map, _))) => Target::Densities { row: &mut densities[..], map },
-                (None, None) => Target::Pixels {
+            let mut target = match finer.last_mut() {
+                Some(next) => Target::Next(next),
+                None => Target::Pixels {
                     row: &mut densities[..],
                     pixels: &net.pixels,
                     map: &mut sed_j_per_m3[..],
@@ -130,9 +124,6 @@ impl WithSimd for Work<'_> {
                 &mut levels[index],
                 &mut target,
             );
-        }
-        if let Some((map, upsampling)) = coarse {
-            net.pixels.interpolate(simd, map, upsampling, densities, (sed_j_per_m3, adds));
         }
     }
 }

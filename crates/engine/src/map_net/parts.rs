@@ -5,8 +5,6 @@
 pub(super) struct Parts {
     /// The factor from Pa to the network's unit.
     pub unit: f32,
-    /// Width of one of the network's pixels in pixels of the map: 1 or 2.
-    pub pixel: usize,
     /// Number of strain components, C.
     pub components: usize,
     /// The levels, the finest first.

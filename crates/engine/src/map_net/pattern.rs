@@ -10,6 +10,8 @@ use tract_onnx::pb::ModelProto;
 
 /// Number of pixels in a block.
 const BLOCK: usize = 4;
+/// Blocks in a row or a column of the finest level.
+const FINEST_SIDE: usize = MAP_SIDE_PX / 2;
 /// Greatest width of a convolution, blocks.
 const KERNEL_MAX: usize = 31;
 /// The most members of a mean. Members may share constants, so without a limit a small file could
@@ -52,28 +54,19 @@ fn network(graph: &Graph<'_>, name: &str) -> Option<Parts> {
         return None;
     }
     mask.iter_mut().for_each(|mask| *mask *= unit);
-    let mut sed = graph.shuffled(sed)?;
-    let mut pixel = 1;
-    if let Some((coarse, shape, weights)) = graph.convolution(sed) {
-        if mixed(shape, &weights)? != [1.0] {
-            return None;
-        }
-        (sed, pixel) = (graph.shuffled(coarse)?, 2);
-    }
-    let node = graph.node(sed, "ReduceSum")?;
+    let node = graph.node(graph.shuffled(sed)?, "ReduceSum")?;
     let [squares, axes] = inputs(node)?;
     if graph.whole(axes)? != [1] || attribute(node, "keepdims")?.i != 0 {
         return None;
     }
-    let side = MAP_SIDE_PX / pixel / 2;
     let (squares, shape) = graph.reshaped(squares)?;
     let [_, components, BLOCK_I64, rows, columns] = shape[..] else { return None };
     let components = usize::try_from(components).ok().filter(|count| *count > 0)?;
     let [found, again] = graph.inputs(squares, "Mul")?;
-    if found != again || [rows, columns] != [side as i64; 2] {
+    if found != again || [rows, columns] != [FINEST_SIDE as i64; 2] {
         return None;
     }
-    Reader { graph, components }.read(found, pixel, mask)
+    Reader { graph, components }.read(found, mask)
 }
 
 const BLOCK_I64: i64 = BLOCK as i64;
@@ -85,10 +78,10 @@ struct Reader<'g, 'a> {
 
 impl<'a> Reader<'_, 'a> {
     /// Reads the levels, beginning with the components of the finest.
-    fn read(&self, finest: &'a str, pixel: usize, mask: Vec<f32>) -> Option<Parts> {
+    fn read(&self, finest: &'a str, mask: Vec<f32>) -> Option<Parts> {
         let graph = self.graph;
         let mut levels = Vec::new();
-        let (mut found, mut side) = (finest, MAP_SIDE_PX / pixel / 2);
+        let (mut found, mut side) = (finest, FINEST_SIDE);
         let mut finer: Option<&str> = None;
         let mut unit = None;
         loop {
@@ -97,7 +90,7 @@ impl<'a> Reader<'_, 'a> {
             if let Some(finer) = finer {
                 (self.means(source)? == finer).then_some(())?;
             } else {
-                unit = Some(self.unit(source, pixel)?);
+                unit = Some(self.unit(source)?);
             }
             levels.push(level);
             if levels.len() > LEVELS_MAX {
@@ -111,7 +104,6 @@ impl<'a> Reader<'_, 'a> {
             let (unit, components) = (unit?, self.components);
             return (mask.len() == MAP_LEN).then_some(Parts {
                 unit,
-                pixel,
                 components,
                 levels,
                 rank,
@@ -221,10 +213,8 @@ impl<'a> Reader<'_, 'a> {
     }
 
     /// The factor between the input in Pa and the network's pixels.
-    fn unit(&self, name: &'a str, pixel: usize) -> Option<f32> {
-        let pixels =
-            if pixel == 2 { self.blocks(self.means(name)?, MAP_SIDE_PX / 2)? } else { name };
-        let (map, unit) = self.graph.scaled(pixels)?;
+    fn unit(&self, name: &'a str) -> Option<f32> {
+        let (map, unit) = self.graph.scaled(name)?;
         (map == INPUT_NAME).then_some(unit)
     }
 

@@ -24,9 +24,7 @@ pub(super) struct Pixels {
 pub(super) enum Target<'a> {
     /// They are the input of the next finer level.
     Next(&'a mut Above),
-    /// They become densities of pixels of 2 x 2, which are interpolated later.
-    Densities { row: &'a mut [f32], map: &'a mut Above },
-    /// They become densities of the map's pixels.
+    /// They become densities of pixels.
     Pixels { row: &'a mut [f32], pixels: &'a Pixels, map: &'a mut [f32], adds: bool },
 }
 
@@ -68,24 +66,6 @@ impl Pixels {
             interleave(left, right, &mut map[2 * start..2 * end], |_, value, at| value * mask[at]);
             map[..2 * start].fill(0.0);
             map[2 * end..].fill(0.0);
-        }
-    }
-
-    /// Interpolates the densities of pixels of 2 x 2, and writes the map.
-    #[inline(always)]
-    pub(super) fn interpolate<S: Simd>(
-        &self,
-        simd: S,
-        coarse: &Above,
-        upsampling: &mut Upsampling,
-        densities: &mut [f32],
-        (map, adds): (&mut [f32], bool),
-    ) {
-        upsampling.begin(simd, coarse, None);
-        for row in 0..SIDE {
-            upsampling.advance(simd, coarse, None, row);
-            upsampling.write(simd, row, &self.columns[row], densities);
-            self.write(row, densities, map, adds);
         }
     }
 }
@@ -130,29 +110,18 @@ impl Target<'_> {
                     to_pixels(of_channel, side, channel, at, above);
                 }
             }
-            Self::Densities { row, map } => {
-                let side = map.side / 2;
-                squares(simd, 0..side, side, components, row);
-                to_pixels(row, side, 0, at, map);
-            }
             Self::Pixels { row, pixels, map, adds } => {
-                squares(simd, pixels.columns[at].clone(), SIDE, components, row);
+                squares(simd, pixels.columns[at].clone(), components, row);
                 pixels.write(at, row, map, *adds);
             }
         }
     }
 }
 
-/// Computes the sums of the squares of all components: `[4, n + MARGIN]`.
+/// Computes the sums of the squares of all components: `[4, 112 + MARGIN]`.
 #[inline(always)]
-fn squares<S: Simd>(
-    simd: S,
-    columns: Range<usize>,
-    side: usize,
-    components: &[f32],
-    densities: &mut [f32],
-) {
-    let wide = side + MARGIN;
+fn squares<S: Simd>(simd: S, columns: Range<usize>, components: &[f32], densities: &mut [f32]) {
+    let wide = SIDE + MARGIN;
     let components = &components[..components.len() - GROUP * wide];
     let count = columns.len().div_ceil(S::F32_LANES);
     for pixel in 0..GROUP {

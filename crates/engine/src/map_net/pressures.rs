@@ -119,30 +119,24 @@ pub(super) struct Pressures {
     unit: f32,
     /// Two rows of the map in the network's unit.
     rows: Vec<f32>,
-    /// Width of one of the network's pixels in pixels of the map: 1 or 2.
-    pixel: usize,
     /// The finest first.
     pub levels: Vec<Blocks>,
-    /// The pixels that each level's blocks are made of, and last the means of the coarsest blocks.
-    /// The first is empty if the network's pixels are the map's own.
+    /// The pixels that the blocks of each level but the finest are made of, and last the means of
+    /// the coarsest blocks.
     maps: Vec<Vec<f32>>,
     /// Which pairs of rows of the map had any pressure the last time.
     had_some: Vec<bool>,
 }
 
 impl Pressures {
-    pub(super) fn new(unit: f32, pixel: usize, layouts: &[Layout]) -> Self {
-        let mut maps: Vec<_> =
-            layouts.iter().map(|layout| vec![0.0; 4 * layout.side * layout.side]).collect();
-        if pixel == 1 {
-            maps[0] = vec![];
-        }
+    pub(super) fn new(unit: f32, layouts: &[Layout]) -> Self {
+        let pixels = layouts.iter().map(|layout| 4 * layout.side * layout.side);
+        let mut maps: Vec<_> = pixels.skip(1).map(|count| vec![0.0; count]).collect();
         let coarsest = layouts[layouts.len() - 1].side;
         maps.push(vec![0.0; coarsest * coarsest]);
         Self {
             unit,
             rows: vec![0.0; 2 * MAP_SIDE_PX],
-            pixel,
             levels: layouts.iter().map(|layout| Blocks::new(*layout)).collect(),
             maps,
             had_some: vec![true; MAP_SIDE_PX / 2],
@@ -171,16 +165,10 @@ impl Pressures {
                 *value = if p.abs() >= PRESSURE_MIN_PA { *p * self.unit } else { 0.0 };
             }
             let (upper, lower) = self.rows.split_at(MAP_SIDE_PX);
-            if self.pixel == 1 {
-                let means = of_row(row, MAP_SIDE_PX / 2);
-                self.levels[0].take(row, [upper, lower], &mut self.maps[1][means]);
-            } else {
-                let means = &mut self.maps[0][of_row(row, MAP_SIDE_PX / 2)];
-                halve([upper, lower], means);
-            }
+            let means = of_row(row, MAP_SIDE_PX / 2);
+            self.levels[0].take(row, [upper, lower], &mut self.maps[0][means]);
         }
-        let first = if self.pixel == 1 { 1 } else { 0 };
-        for (level, blocks) in self.levels.iter_mut().enumerate().skip(first) {
+        for (level, blocks) in self.levels[1..].iter_mut().enumerate() {
             let (maps, coarser) = self.maps.split_at_mut(level + 1);
             let (map, side) = (&maps[level], blocks.layout.side);
             for row in 0..side {

@@ -77,7 +77,7 @@ impl Upsampling {
 
     /// Prepares for the first row.
     #[inline(always)]
-    pub(super) fn begin<S: Simd>(&mut self, simd: S, above: &Above, mix: Option<&Sums>) {
+    pub(super) fn begin<S: Simd>(&mut self, simd: S, above: &Above, mix: &Sums) {
         let len = self.row_len();
         self.halves[(ROWS - 1) * len..].fill(0.0);
         self.take(simd, above, mix, 0);
@@ -85,13 +85,7 @@ impl Upsampling {
 
     /// Prepares a row for writing. Rows must come one after another.
     #[inline(always)]
-    pub(super) fn advance<S: Simd>(
-        &mut self,
-        simd: S,
-        above: &Above,
-        mix: Option<&Sums>,
-        row: usize,
-    ) {
+    pub(super) fn advance<S: Simd>(&mut self, simd: S, above: &Above, mix: &Sums, row: usize) {
         if row + 1 < self.side {
             self.take(simd, above, mix, row + 1);
         } else {
@@ -101,24 +95,17 @@ impl Upsampling {
     }
 
     #[inline(always)]
-    fn take<S: Simd>(&mut self, simd: S, above: &Above, mix: Option<&Sums>, row: usize) {
+    fn take<S: Simd>(&mut self, simd: S, above: &Above, mix: &Sums, row: usize) {
         let (side, width) = (self.side, self.side + 2 * MARGIN);
         let from = &above.values[Above::place(side, 0, row)..];
-        if let Some(mix) = mix {
-            for group in 0..mix.groups() {
-                in_vectors!(S, 0, side, at, V => {
-                    let sums = mix.of_group::<S, V>(simd, group, &from[at..]);
-                    for (channel, sums) in sums.iter().enumerate() {
-                        let channel = group * GROUP + channel;
-                        store::<S>(sums, &mut self.mixed[channel * width + MARGIN + at..]);
-                    }
-                });
-            }
-        } else {
-            for channel in 0..self.channels {
-                let mixed = &mut self.mixed[channel * width + MARGIN..][..side];
-                mixed.copy_from_slice(&from[channel * Above::plane_len(side)..][..side]);
-            }
+        for group in 0..mix.groups() {
+            in_vectors!(S, 0, side, at, V => {
+                let sums = mix.of_group::<S, V>(simd, group, &from[at..]);
+                for (channel, sums) in sums.iter().enumerate() {
+                    let channel = group * GROUP + channel;
+                    store::<S>(sums, &mut self.mixed[channel * width + MARGIN + at..]);
+                }
+            });
         }
         let (len, channels) = (self.row_len(), self.channels);
         let count = side.div_ceil(S::F32_LANES);

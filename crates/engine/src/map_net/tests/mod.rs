@@ -11,7 +11,7 @@ mod naive;
 
 /// What is added where answers are compared: pressures of less than 1e-9 Pa count for nothing.
 const NOTHING: f32 = 1e-20;
-const MAP_NETS: [&str; 5] = ["pico", "nano", "small", "large", "large-maps"];
+const MAP_NETS: [&str; 4] = ["nano", "small", "large", "large-maps"];
 
 fn read(name: &str) -> Vec<u8> {
     let path = format!("{}/../../models/{name}.onnx", env!("CARGO_MANIFEST_DIR"));
@@ -113,7 +113,7 @@ impl Patch {
 
 thread_local! {
     static PAIRS: RefCell<Vec<Pair>> =
-        RefCell::new(["pico", "nano", "small"].into_iter().map(Pair::new).collect());
+        RefCell::new(["nano", "small"].into_iter().map(Pair::new).collect());
 }
 
 proptest! {
@@ -167,7 +167,7 @@ fn wide_networks_and_means_are_answered_as_by_the_graph() {
 
 #[test]
 fn single_pixels_and_the_whole_map_are_answered_as_by_the_graph() {
-    for name in ["pico", "nano", "small"] {
+    for name in ["nano", "small"] {
         let mut pair = Pair::new(name);
         let max_pa = pair.max_pa;
         let last = MAP_SIDE_PX - 1;

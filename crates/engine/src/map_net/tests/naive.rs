@@ -103,9 +103,6 @@ fn answer(parts: &Parts, pressure_pa: &[f32]) -> Map {
     let count = parts.components;
     let mut pixels: Map =
         pressure_pa.iter().map(|p| f64::from(*p) * f64::from(parts.unit)).collect();
-    if parts.pixel == 2 {
-        pixels = means(&unshuffle(&pixels, MAP_SIDE_PX / 2));
-    }
     let mut blocks = vec![];
     for level in &parts.levels {
         blocks.push(unshuffle(&pixels, level.side));
@@ -140,13 +137,8 @@ fn answer(parts: &Parts, pressure_pa: &[f32]) -> Map {
     }
     let len = above.len() / count;
     let _ = components;
-    let mut sed: Map =
-        (0..len).map(|at| (0..count).map(|c| above[c * len + at].powi(2)).sum()).collect();
-    if parts.pixel == 2 {
-        let side = MAP_SIDE_PX / 2;
-        sed = shuffle(&convolve(&sed, side, &between(&[1.0], 1), 4, 3), side);
-    }
-    sed.iter().zip(&parts.mask).map(|(sed, mask)| sed * f64::from(*mask)).collect()
+    let sed = (0..len).map(|at| (0..count).map(|c| above[c * len + at].powi(2)).sum::<f64>());
+    sed.zip(&parts.mask).map(|(sed, mask)| sed * f64::from(*mask)).collect()
 }
 
 /// Weights of a size that keeps values about 1.
@@ -161,15 +153,14 @@ struct Shape {
     rank: usize,
     /// Width and kernel of the correction of each level, the finest first.
     corrections: Vec<Option<(usize, usize)>>,
-    pixel: usize,
     places: usize,
 }
 
 fn parts(shape: &Shape, rng: &mut fastrand::Rng) -> Parts {
-    let Shape { components, kernel, rank, pixel, places, .. } = *shape;
+    let Shape { components, kernel, rank, places, .. } = *shape;
     let mut levels = vec![];
     for (index, correction) in shape.corrections.iter().enumerate() {
-        let side = (MAP_SIDE_PX / pixel / 2) >> index;
+        let side = (MAP_SIDE_PX / 2) >> index;
         let (channels, inputs) = (4 * components, 4 * components + 4);
         let place = random(rng, places * side * side, 1);
         levels.push(LevelParts {
@@ -201,7 +192,6 @@ fn parts(shape: &Shape, rng: &mut fastrand::Rng) -> Parts {
     });
     Parts {
         unit: 0.001,
-        pixel,
         components,
         rank,
         reach_in: random(rng, coarsest * rank, 50),
@@ -215,13 +205,12 @@ fn parts(shape: &Shape, rng: &mut fastrand::Rng) -> Parts {
 fn networks_of_other_shapes_are_what_the_trainer_defines() {
     let mut rng = fastrand::Rng::with_seed(7);
     for shape in [
-        Shape { components: 1, kernel: 1, rank: 1, corrections: vec![None], pixel: 1, places: 1 },
+        Shape { components: 1, kernel: 1, rank: 1, corrections: vec![None], places: 1 },
         Shape {
             components: 5,
             kernel: 5,
             rank: 7,
             corrections: vec![None, Some((3, 1)), Some((5, 3))],
-            pixel: 1,
             places: 5,
         },
         Shape {
@@ -229,7 +218,6 @@ fn networks_of_other_shapes_are_what_the_trainer_defines() {
             kernel: 7,
             rank: 33,
             corrections: vec![Some((1, 3)), Some((6, 1)), None],
-            pixel: 1,
             places: 2,
         },
         Shape {
@@ -237,7 +225,6 @@ fn networks_of_other_shapes_are_what_the_trainer_defines() {
             kernel: 3,
             rank: 4,
             corrections: vec![None, None, None, None],
-            pixel: 1,
             places: 5,
         },
         Shape {
@@ -245,7 +232,6 @@ fn networks_of_other_shapes_are_what_the_trainer_defines() {
             kernel: 9,
             rank: 5,
             corrections: vec![None, Some((13, 3))],
-            pixel: 2,
             places: 5,
         },
     ] {
