@@ -482,8 +482,8 @@ test('a press is recorded and sent again, and goes into files', async () => {
   assert.equal((await saved('save-npy')).subarray(1, 6).toString(), 'NUMPY');
   assert.equal((await saved('save-png')).subarray(1, 4).toString(), 'PNG');
   // What stands in the picture: of a choice what is chosen, and the ends of each scale.
-  await page.selectOption('#with', 'tier:pico');
-  await until(() => globalThis.papilla.pictures.pair.of === 'tier:pico');
+  await page.selectOption('#with', 'tier:small');
+  await until(() => globalThis.papilla.pictures.pair.of === 'tier:small');
   const words = await page.evaluate(async () => {
     const { pictureOf } = await import('./share.mjs');
     const [said, { fillText }] = [[], CanvasRenderingContext2D.prototype];
@@ -495,7 +495,7 @@ test('a press is recorded and sent again, and goes into files', async () => {
     CanvasRenderingContext2D.prototype.fillText = fillText;
     return said;
   });
-  assert.ok(['Pressure', 'SED by nano', 'SED by pico', 'First − second'].every((title) => words.includes(title)), words.join('; '));
+  assert.ok(['Pressure', 'SED by nano', 'SED by small', 'First − second'].every((title) => words.includes(title)), words.join('; '));
   assert.equal(words.filter((word) => /^≥ [\d.]+ (kPa|J\/m³|kJ\/m³)$/.test(word)).length, 3, words.join('; '));
   await page.selectOption('#with', '');
 });
