@@ -9,7 +9,7 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 - `local`: a session as `Session`, computed in this process
 - `Model`: SED of a map or many, computed in this process
 - `Finger`, `Hand`: what pushes back on one finger or several, computed in this process
-- `fe`: finite elements in this process: scenes explained and solved, states with maps and fields
+- `fe`: finite elements in this process: scenes solved, states with maps and fields, campaigns, datasets
 - `afferents`, `actuators`: firing rates, spikes and intensities of SED that is known
 - `SpikeTrains`: when the touch units of a finger fire, as files
 - `sensors`: readings of an array of taxels to pressure, SED, rates and spikes
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .atlas import Atlas, Contact
     from .errors import (
         BadAddress,
+        BadDataset,
         BadFrame,
         BadInput,
         BadModels,
@@ -62,6 +63,7 @@ __all__ = [
     "AsyncSession",
     "Atlas",
     "BadAddress",
+    "BadDataset",
     "BadFrame",
     "BadInput",
     "BadModels",
@@ -117,6 +119,7 @@ _NAMES = {
     "atlas": ("Atlas", "Contact"),
     "errors": (
         "BadAddress",
+        "BadDataset",
         "BadFrame",
         "BadInput",
         "BadModels",

@@ -104,8 +104,15 @@ class BadModels(PapillaError):
     """A folder of models cannot be used; the message names the file, what is wrong and what to do."""
 
 
+class BadDataset(PapillaError):
+    """A folder holds no dataset, a damaged one, or that of another campaign; the message says which, and of what."""
+
+
 class BadScene(PapillaError, ValueError):
-    """A scene of finite elements cannot be. `field` is the member that is to blame, dotted, and `line` its line."""
+    """A scene or a campaign of finite elements cannot be.
+
+    `field` is the member that is to blame, dotted, and `line` its line.
+    """
 
     def __init__(self, message: str, field: str | None = None, line: int | None = None) -> None:
         super().__init__(message)
@@ -117,8 +124,9 @@ class NotSolved(PapillaError):
     """A scene of finite elements found no equilibrium.
 
     `kind` is `no_equilibrium`, `too_many_steps`, `slipped`, `force_not_reached`, `inverted`, `free_part`,
-    `too_large` or `stopped`; `states` is how many states were found before. `depth_mm` is the depth that was
-    aimed at, and `reached` the part of the whole load in equilibrium, both None where there is none.
+    `too_large`, `stopped`, or, of a campaign, `nothing_solved`; `states` is how many states were found before.
+    `depth_mm` is the depth that was aimed at, and `reached` the part of the whole load in equilibrium, both None
+    where there is none.
     """
 
     def __init__(

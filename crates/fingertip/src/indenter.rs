@@ -17,6 +17,14 @@ pub enum IndenterError {
         /// Why, and the cure.
         message: String,
     },
+    /// A file cannot be taken as a mesh.
+    #[error("indenter.file: {} is no mesh to press with: {message}", path.display())]
+    MeshFile {
+        /// The file.
+        path: PathBuf,
+        /// Why, and the cure.
+        message: String,
+    },
     /// It goes by.
     #[error(
         "the indenter never meets the body on its way: bring it nearer by motion.offset_mm and \
@@ -63,6 +71,7 @@ impl From<ShapeError> for IndenterError {
         match error {
             ShapeError::Value(value) => Self::Value(value),
             ShapeError::Picture { path, message } => Self::Picture { path, message },
+            ShapeError::MeshFile { path, message } => Self::MeshFile { path, message },
         }
     }
 }

@@ -2,28 +2,15 @@
 
 use papilla_fingertip::geometry::fingertip::FingertipShapeError;
 use papilla_fingertip::scene::FingerError;
-use std::path::PathBuf;
+use papilla_sdf::files::FileError;
 
 /// Why no finger was made of a surface. Places are in the file's own frame, mm, unless said
 /// otherwise.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
-    /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Not a surface of a known kind.
-    #[error("{}: {message}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, with the cure.
-        message: String,
-    },
+    /// The file holds no surface.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// Another unit than was said.
     #[error(
         "the surface is {diagonal:.3} {unit} from corner to corner, which no finger is: it looks like {meant}. \

@@ -2,7 +2,7 @@
 
 use super::rules::{BadValue, ShapeError, length, lengths, require};
 use super::{Distance, SignedDistance};
-#[cfg(feature = "pictures")]
+#[cfg(feature = "files")]
 use image::{ColorType, DynamicImage};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub struct Heightmap {
 }
 
 /// Most pixels along a side.
-#[cfg(feature = "pictures")]
+#[cfg(feature = "files")]
 const SIDE_MAX_PX: u32 = 4096;
 
 impl Heightmap {
@@ -39,14 +39,14 @@ impl Heightmap {
     }
 
     /// Refuses the picture: this build reads none.
-    #[cfg(not(feature = "pictures"))]
+    #[cfg(not(feature = "files"))]
     pub(super) fn read(&self, folder: &Path) -> Result<HeightField, ShapeError> {
-        let message = "this program is built without the feature `pictures`".into();
+        let message = "this program is built without the feature `files`".into();
         Err(ShapeError::Picture { path: folder.join(&self.file), message })
     }
 
     /// Reads the picture.
-    #[cfg(feature = "pictures")]
+    #[cfg(feature = "files")]
     pub(super) fn read(&self, folder: &Path) -> Result<HeightField, ShapeError> {
         let path = folder.join(&self.file);
         let refuse = |message: String| ShapeError::Picture { path: path.clone(), message };
@@ -60,7 +60,7 @@ impl Heightmap {
         self.field(&picture).map_err(refuse)
     }
 
-    #[cfg(feature = "pictures")]
+    #[cfg(feature = "files")]
     fn field(&self, picture: &DynamicImage) -> Result<HeightField, String> {
         let (columns, rows) = (picture.width(), picture.height());
         if !(2..=SIDE_MAX_PX).contains(&columns) || !(2..=SIDE_MAX_PX).contains(&rows) {

@@ -32,6 +32,14 @@ pub enum ShapeError {
         /// Why, and the cure.
         message: String,
     },
+    /// A file cannot be taken as a mesh.
+    #[error("{} is no mesh to press with: {message}", path.display())]
+    MeshFile {
+        /// The file.
+        path: PathBuf,
+        /// Why, and the cure.
+        message: String,
+    },
 }
 
 impl BadValue {

@@ -2,8 +2,8 @@
 
 use super::rules::{BadValue, ShapeError, parts, placed, require};
 use super::{
-    AnyOf, Cylinder, Dots, Grating, Heightmap, Placed, Placement, Plate, Punch, Ring, RoundedPlate,
-    SignedDistance, Sphere, Wedge,
+    AnyOf, Cylinder, Dots, Grating, Heightmap, MeshFile, Placed, Placement, Plate, Punch, Ring,
+    RoundedPlate, SignedDistance, Sphere, Wedge,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -32,6 +32,8 @@ pub enum IndenterSpec {
     Dots(Dots),
     /// Surface from a picture.
     Heightmap(Heightmap),
+    /// Closed body from a file of triangles.
+    Mesh(MeshFile),
     /// Several of them, each moved and turned.
     Union(Union),
 }
@@ -57,6 +59,7 @@ impl IndenterSpec {
             Self::Grating(_) => "grating",
             Self::Dots(_) => "dots",
             Self::Heightmap(_) => "heightmap",
+            Self::Mesh(_) => "mesh",
             Self::Union(_) => "union",
         }
     }
@@ -80,6 +83,7 @@ impl IndenterSpec {
             Self::Grating(s) => s.validate(),
             Self::Dots(s) => s.validate(),
             Self::Heightmap(s) => s.validate(),
+            Self::Mesh(s) => s.validate(),
             Self::Union(s) => s.validate(),
         }
     }
@@ -106,24 +110,38 @@ impl IndenterSpec {
             Self::Dots(s) => s.reach_mm(direction),
             Self::Heightmap(_) if upright => 0.0,
             Self::Heightmap(_) => f64::INFINITY,
+            Self::Mesh(s) => s.bound_mm(direction),
             Self::Union(s) => s.bound_mm(direction),
         }
     }
 
-    /// The pictures that it is made from.
+    /// Reads the meshes that it is made from, relative to `folder`: where they end is not known before.
+    ///
+    /// # Errors
+    /// [`ShapeError::MeshFile`] if a file cannot be read.
+    pub fn load(&mut self, folder: &Path) -> Result<(), ShapeError> {
+        match self {
+            Self::Mesh(s) => s.load(folder),
+            Self::Union(s) => s.parts.iter_mut().try_for_each(|p| p.part.load(folder)),
+            _ => Ok(()),
+        }
+    }
+
+    /// The files that it is made from.
     #[must_use]
-    pub fn pictures(&self) -> Vec<&Path> {
+    pub fn files(&self) -> Vec<&Path> {
         match self {
             Self::Heightmap(s) => vec![&s.file],
-            Self::Union(s) => s.parts.iter().flat_map(|p| p.part.pictures()).collect(),
+            Self::Mesh(s) => vec![&s.file],
+            Self::Union(s) => s.parts.iter().flat_map(|p| p.part.files()).collect(),
             _ => Vec::new(),
         }
     }
 
-    /// The shape; pictures are read from `folder`.
+    /// The shape; files are read from `folder`.
     ///
     /// # Errors
-    /// [`ShapeError::Picture`] if a picture cannot be read.
+    /// [`ShapeError::Picture`] and [`ShapeError::MeshFile`] if a file cannot be taken.
     pub fn build(&self, folder: &Path) -> Result<Arc<dyn SignedDistance>, ShapeError> {
         Ok(match self {
             Self::Plate(s) => shared(RoundedPlate::from(s)),
@@ -135,6 +153,7 @@ impl IndenterSpec {
             Self::Grating(s) => shared(*s),
             Self::Dots(s) => shared(*s),
             Self::Heightmap(s) => shared(s.read(folder)?),
+            Self::Mesh(s) => shared(s.build(folder)?),
             Self::Union(s) => shared(s.build(folder)?),
         })
     }

@@ -2,7 +2,6 @@
 
 use super::campaign_file::CampaignFile;
 use super::{CHECKS_FAILED, print};
-use crate::campaign::{self, StatusReader};
 use papilla_dataset as dataset;
 use papilla_dataset::ImageOptions;
 use papilla_output::map_image::Bits;
@@ -138,14 +137,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             print(&names, *json, || names.join("\n"))?;
         }
         Command::Merge { campaign, out, json } => {
-            let report = campaign::merge(&campaign.read()?, out)?;
+            let report = papilla_campaign::merge(&campaign.read()?, out)?;
             print(&report, *json, || report.to_string())?;
             if !report.is_complete() {
                 return Ok(ExitCode::from(CHECKS_FAILED));
             }
         }
         Command::Status { campaign, out, watch, json } => {
-            let mut reader = StatusReader::new(&campaign.read()?, out)?;
+            let mut reader = papilla_campaign::StatusReader::new(&campaign.read()?, out)?;
             loop {
                 let status = reader.read()?;
                 let clear = if *watch && std::io::stdout().is_terminal() { CLEAR } else { "" };

@@ -8,7 +8,6 @@ mod contact;
 mod convergence;
 mod dataset;
 mod explain;
-mod explain_campaign;
 mod export;
 mod finger;
 mod generate;

@@ -5,11 +5,15 @@
 //! wherever something is computed, and a panic ends in `papilla.NativeFault`.
 
 mod border;
+mod campaign;
+mod dataset;
 mod feel;
 mod finger;
 mod models;
+mod problem;
 mod scene;
 mod session;
+mod state;
 
 use pyo3::prelude::*;
 
@@ -18,13 +22,16 @@ use pyo3::prelude::*;
 #[pyo3(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<campaign::Campaign>()?;
+    module.add_class::<campaign::CampaignRun>()?;
+    module.add_class::<dataset::Dataset>()?;
     module.add_class::<feel::Feel>()?;
     module.add_class::<finger::Contact>()?;
     module.add_class::<finger::Finger>()?;
     module.add_class::<models::Models>()?;
     module.add_class::<scene::Run>()?;
     module.add_class::<scene::Scene>()?;
-    module.add_class::<scene::State>()?;
+    module.add_class::<state::State>()?;
     module.add_class::<session::Session>()?;
     Ok(())
 }

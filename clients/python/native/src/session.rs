@@ -31,6 +31,17 @@ fn closed(py: Python<'_>) -> PyErr {
     error(py, "Closed", ("the session is closed",))
 }
 
+fn header_of(py: Python<'_>, head: &[u8]) -> PyResult<FrameHeader> {
+    FrameHeader::decode(head).map_err(|problem| {
+        let told = Problem::new(problem.code(), problem.to_string());
+        let told = match problem.field() {
+            Some(field) => told.at(field),
+            None => told,
+        };
+        refused(py, &told)
+    })
+}
+
 #[pymethods]
 impl Session {
     /// What the session agreed to, as JSON.
@@ -51,16 +62,7 @@ impl Session {
         samples: PyBuffer<u8>,
     ) -> PyResult<Bound<'py, PyByteArray>> {
         let start = Instant::now();
-        let header = FrameHeader::decode(head).map_err(|problem| {
-            let told = Problem::new(problem.code(), problem.to_string());
-            refused(
-                py,
-                &match problem.field() {
-                    Some(field) => told.at(field),
-                    None => told,
-                },
-            )
-        })?;
+        let header = header_of(py, head)?;
         // Lent, so that neither the interpreter's lock nor the session's is held for the other's.
         let mut state = compute(py, || lock(&self.state).take())?.ok_or_else(|| closed(py))?;
         state.payload.resize(samples.item_count(), 0);
@@ -90,6 +92,33 @@ impl Session {
         });
         *lock(&self.state) = Some(state);
         answer.map_err(|problem| refused(py, &problem))?
+    }
+
+    /// Renders a frame again and again, and gives how long each time took here, ns. What a frame takes
+    /// in Python beyond that is the price of Python.
+    ///
+    /// Raises Refused, and the session goes on.
+    fn timed(
+        &self,
+        py: Python<'_>,
+        head: &[u8],
+        samples: &[u8],
+        times: usize,
+    ) -> PyResult<Vec<u64>> {
+        let header = header_of(py, head)?;
+        let mut state = compute(py, || lock(&self.state).take())?.ok_or_else(|| closed(py))?;
+        state.payload = samples.to_vec();
+        let (state, found) = compute(py, move || {
+            let frame = |_| {
+                let start = Instant::now();
+                state.render(&header)?;
+                Ok(u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX))
+            };
+            let found = (0..times).map(frame).collect::<Result<Vec<_>, Problem>>();
+            (state, found)
+        })?;
+        *lock(&self.state) = Some(state);
+        found.map_err(|problem| refused(py, &problem))
     }
 
     /// Ends the session.

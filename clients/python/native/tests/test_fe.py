@@ -97,6 +97,41 @@ def test_a_map_of_pressure_presses_as_the_indenter_that_it_came_of(command, tmp_
     assert error < 0.05
 
 
+def ball_of_triangles(radius_mm, splits):
+    """An STL of a ball, in metres."""
+    t = (1 + 5**0.5) / 2
+    corners = [[-1, t, 0], [1, t, 0], [-1, -t, 0], [1, -t, 0], [0, -1, t], [0, 1, t], [0, -1, -t], [0, 1, -t],
+               [t, 0, -1], [t, 0, 1], [-t, 0, -1], [-t, 0, 1]]  # fmt: skip
+    faces = [[0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
+             [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
+             [8, 6, 7], [9, 8, 1]]  # fmt: skip
+    triangles = np.array(corners, float)[faces]
+    for _ in range(splits):
+        a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        quarters = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+        triangles = np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
+    triangles *= 1e-3 * radius_mm / np.linalg.norm(triangles, axis=2, keepdims=True)
+    record = np.zeros(len(triangles), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")]))
+    record["corners"] = triangles
+    return bytes(80) + np.uint32(len(triangles)).tobytes() + record.tobytes()
+
+
+def test_a_mesh_from_a_file_presses_as_the_body_that_it_is(tmp_path):
+    (tmp_path / "ball.stl").write_bytes(ball_of_triangles(5.0, 4))
+    ball = fe.Scene(FINGER).run(fields=False)[-1]
+    (tmp_path / "scene.toml").write_text(
+        FINGER.replace('shape = "sphere"\nradius_mm = 5.0', 'shape = "mesh"\nfile = "ball.stl"\nunit = "m"')
+    )
+    mesh = fe.Scene(tmp_path / "scene.toml").run(fields=False)[-1]
+    assert mesh.force_n[2] == pytest.approx(ball.force_n[2], rel=0.02)
+    error = np.linalg.norm(mesh.sed_j_per_m3 - ball.sed_j_per_m3) / np.linalg.norm(ball.sed_j_per_m3)
+    assert error < 0.05
+    with pytest.raises(papilla.BadScene, match="cannot read") as bad:
+        fe.Scene(FINGER.replace('shape = "sphere"\nradius_mm = 5.0', 'shape = "mesh"\nfile = "none.stl"'))
+    assert bad.value.field == "indenter.file" and bad.value.line == 9
+
+
 def fe_normals(atlas):
     """How far the outward normal of each pixel looks against z."""
     corners = atlas.positions_mm[atlas.triangles[atlas.owners]]

@@ -52,6 +52,13 @@ def test_hard_case(example):
     assert len(found["found"]) == found["failed"].states > 5 and (np.diff(found["forces_n"]) > 0).all()
 
 
+def test_campaign(example):
+    found = example("campaign", PRESSES="2")
+    states = found["states"]
+    assert len(found["dataset"]) == 8 and states["sed_dermis_j_per_m3"].shape == (8, 224, 224)
+    assert (np.diff(states["force_n"][:4, 2]) > 0).all()
+
+
 def test_braille(example):
     found = example("braille", WORD="al")
     trains, dots_mm = found["trains"], found["dots_mm"]

@@ -2,6 +2,7 @@
 
 use super::error::SpecError;
 use crate::geometry::fingertip::FingertipShape;
+use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::effects::usual;
 use crate::scene::finger::sha256_of;
@@ -191,7 +192,22 @@ impl CampaignSpec {
             source: Box::new(source),
         })?;
         spec.validate()?;
+        spec.take_meshes()?;
         Ok(spec)
+    }
+
+    /// Reads the files of meshes that press.
+    fn take_meshes(&mut self) -> Result<(), SpecError> {
+        let single = self.indenter.iter_mut().map(|indenter| ("", indenter));
+        let several = self.indenters.iter_mut().map(|c| (c.name.as_str(), &mut c.indenter));
+        for (name, indenter) in single.chain(several) {
+            indenter.load(&self.folder).map_err(|error| SpecError::Scene {
+                campaign: self.name.clone(),
+                indenter: name.to_owned(),
+                source: Box::new(IndenterError::from(error).into()),
+            })?;
+        }
+        Ok(())
     }
 
     /// Reads the finger that the file names; its tissues stand where the file gives none.

@@ -135,7 +135,7 @@ impl SceneError {
 pub(crate) fn indenter_field(error: &IndenterError) -> String {
     match error {
         IndenterError::Value(e) => e.field.clone(),
-        IndenterError::Picture { .. } => "indenter.file".into(),
+        IndenterError::Picture { .. } | IndenterError::MeshFile { .. } => "indenter.file".into(),
         IndenterError::NeverTouches | IndenterError::StartsInside { .. } => {
             "motion.offset_mm".into()
         }

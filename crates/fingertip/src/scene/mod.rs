@@ -170,7 +170,7 @@ impl Scene {
         if map_pa.is_some() {
             scene.pressure.get_or_insert_default().map_pa = map_pa;
         }
-        if let Err(e) = scene.take_finger() {
+        if let Err(e) = scene.take_finger().and_then(|()| scene.take_meshes()) {
             return Err(e.at(&scene));
         }
         match scene.validate() {
@@ -194,6 +194,12 @@ impl Scene {
             self.materials = found.tissue;
         }
         Ok(())
+    }
+
+    /// Reads the files of meshes that press.
+    fn take_meshes(&mut self) -> Result<(), SceneError> {
+        self.indenter.validate().map_err(IndenterError::from)?;
+        Ok(self.indenter.load(&self.folder).map_err(IndenterError::from)?)
     }
 
     /// Where the file says what `field` is; `None` for a scene made by a program or

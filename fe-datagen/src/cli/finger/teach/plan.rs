@@ -5,7 +5,7 @@ use super::error::TeachError;
 use super::lender::Lender;
 use super::programs::Programs;
 use super::sequence::{self, Scale};
-use crate::campaign::{CampaignError, Status, StatusReader};
+use papilla_campaign::{CampaignError, Status, StatusReader};
 use papilla_fingertip::campaign::{CampaignSpec, held_out, indentations};
 use papilla_output::atomic;
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@
 //! every file is either whole or absent, has the same content whichever process writes it, and
 //! counts only if a record names it.
 
-use super::CampaignError;
+use crate::CampaignError;
 use papilla_atlas::Atlas;
 use papilla_dataset::{Checks, FORMAT, sha256_hex, shard_file};
 use papilla_fingertip::campaign::{CampaignSpec, Indentation};
@@ -14,7 +14,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Program and version, as manifests name it.
-pub(super) const SOFTWARE: &str = concat!("fe-datagen ", env!("CARGO_PKG_VERSION"));
+pub(crate) const SOFTWARE: &str = concat!("fe-datagen ", env!("CARGO_PKG_VERSION"));
 
 /// Which campaign a folder belongs to.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -24,7 +24,7 @@ struct Owner {
 
 /// What became of one indentation; written after its shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct IndentationState {
+pub(crate) struct IndentationState {
     pub press: Indentation,
     /// Wall time, s. Not part of the dataset: it is never the same twice.
     pub seconds: f64,
@@ -40,7 +40,7 @@ pub(super) struct IndentationState {
 /// Solved, with a shard, or failed, without.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Outcome {
+pub(crate) enum Outcome {
     Solved {
         sha256: String,
         samples: usize,
@@ -57,13 +57,13 @@ pub(super) enum Outcome {
 
 impl IndentationState {
     /// Did it fail?
-    pub(super) fn is_failed(&self) -> bool {
+    pub(crate) fn is_failed(&self) -> bool {
         matches!(self.outcome, Outcome::Failed { .. })
     }
 }
 
 /// What a folder has of an indentation.
-pub(super) enum Found {
+pub(crate) enum Found {
     /// A record, and the shard that it vouches for if there has to be one.
     Vouched(Box<IndentationState>),
     /// No record.
@@ -73,14 +73,14 @@ pub(super) enum Found {
 }
 
 /// A campaign's folder.
-pub(super) struct Workspace {
+pub(crate) struct Workspace {
     folder: PathBuf,
     fingerprint: String,
 }
 
 impl Workspace {
     /// Makes the folder of a campaign, or comes back to it.
-    pub(super) fn open(
+    pub(crate) fn open(
         folder: &Path,
         spec: &CampaignSpec,
         atlas: &Atlas,
@@ -107,7 +107,7 @@ impl Workspace {
     }
 
     /// The folder of a campaign that has been begun; with its atlas.
-    pub(super) fn begun(
+    pub(crate) fn begun(
         folder: &Path,
         spec: &CampaignSpec,
     ) -> Result<(Self, Atlas), CampaignError> {
@@ -141,7 +141,7 @@ impl Workspace {
     }
 
     /// The record of an indentation; its shard is not looked at.
-    pub(super) fn record(&self, press: &Indentation) -> Found {
+    pub(crate) fn record(&self, press: &Indentation) -> Found {
         let path = self.record_path(press.id);
         let state: IndentationState = match atomic::read_json(&path) {
             Ok(state) => state,
@@ -159,7 +159,7 @@ impl Workspace {
 
     /// What there is of an indentation: to be trusted is a readable record whose shard is there
     /// and has the recorded hash.
-    pub(super) fn load(&self, press: &Indentation) -> Found {
+    pub(crate) fn load(&self, press: &Indentation) -> Found {
         let state = match self.record(press) {
             Found::Vouched(state) => state,
             other => return other,
@@ -183,7 +183,7 @@ impl Workspace {
 
     /// Stores an indentation: the shard first, then the record that vouches for it; and forgets
     /// where it stood.
-    pub(super) fn store(
+    pub(crate) fn store(
         &self,
         state: &mut IndentationState,
         shard: Option<&[u8]>,
@@ -202,14 +202,14 @@ impl Workspace {
     }
 
     /// Stores where an indentation stands.
-    pub(super) fn store_standing(&self, id: usize, bytes: &[u8]) -> Result<(), OutputError> {
+    pub(crate) fn store_standing(&self, id: usize, bytes: &[u8]) -> Result<(), OutputError> {
         let mut whole = self.seal(id, bytes).into_bytes();
         whole.extend_from_slice(bytes);
         atomic::write(&self.standing_path(id), &whole)
     }
 
     /// Where an indentation stands, if that is of this campaign and whole.
-    pub(super) fn standing(&self, id: usize) -> Option<Vec<u8>> {
+    pub(crate) fn standing(&self, id: usize) -> Option<Vec<u8>> {
         let path = self.standing_path(id);
         let whole = std::fs::read(&path).ok()?;
         let (seal, bytes) = whole.split_at_checked(SEAL_LEN)?;
@@ -228,14 +228,14 @@ impl Workspace {
 
     /// Removes what killed processes left half-written. Only where everything is vouched for: what
     /// another process is writing is then there already.
-    pub(super) fn remove_partial(&self) -> Result<(), OutputError> {
+    pub(crate) fn remove_partial(&self) -> Result<(), OutputError> {
         ["", "shards", "progress"]
             .into_iter()
             .try_for_each(|part| atomic::remove_partial(&self.folder.join(part)))
     }
 
     /// The output folder.
-    pub(super) fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 }
@@ -258,19 +258,19 @@ fn remove(path: &Path) -> Result<(), OutputError> {
 
 /// Names everything that shards depend on, so that two campaigns never mix.
 fn fingerprint(spec: &CampaignSpec, atlas: &Atlas) -> Result<String, OutputError> {
-    let mut pictures = Vec::new();
+    let mut files = Vec::new();
     for candidate in spec.candidates() {
-        for picture in candidate.indenter.pictures() {
-            let path = spec.folder.join(picture);
+        for file in candidate.indenter.files() {
+            let path = spec.folder.join(file);
             let bytes = std::fs::read(&path).map_err(OutputError::io("read", &path))?;
-            pictures.push(sha256_hex(&bytes));
+            files.push(sha256_hex(&bytes));
         }
     }
     // A shard does not depend on how many follow, nor on which of them are held out: a campaign can
     // be gone on with after more presses were asked for.
     let each =
         CampaignSpec { presses: 0, test_fraction: Some(0.0), test_one_in: None, ..spec.clone() };
-    let text = serde_json::to_string(&(each, pictures, atlas.hash(), FORMAT, SOFTWARE))
+    let text = serde_json::to_string(&(each, files, atlas.hash(), FORMAT, SOFTWARE))
         .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
     Ok(sha256_hex(text.as_bytes()))
 }

@@ -1,8 +1,8 @@
 //! Worker threads that take one indentation after another.
 
-use super::beat::{Beat, Event, Running};
-use super::state::{Found, IndentationState, Outcome, Workspace};
-use super::{BoxError, CampaignError, Checkpoints, IndentationSolver, PressError, RunOptions};
+use crate::beat::{Beat, Event, Running};
+use crate::state::{Found, IndentationState, Outcome, Workspace};
+use crate::{BoxError, CampaignError, Checkpoints, IndentationSolver, PressError, RunOptions};
 use papilla_dataset as dataset;
 use papilla_dataset::Sample;
 use papilla_fingertip::campaign::Indentation;
@@ -16,7 +16,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::time::Instant;
 
 /// What need not be solved any more.
-pub(super) fn settled(found: Found, retry_failed: bool) -> Option<IndentationState> {
+pub(crate) fn settled(found: Found, retry_failed: bool) -> Option<IndentationState> {
     match found {
         Found::Vouched(state) => (!(retry_failed && state.is_failed())).then_some(*state),
         Found::Absent | Found::Untrusted(_) => None,
@@ -24,7 +24,7 @@ pub(super) fn settled(found: Found, retry_failed: bool) -> Option<IndentationSta
 }
 
 /// What a worker made of an indentation.
-pub(super) enum Settled {
+pub(crate) enum Settled {
     Now(IndentationState),
     /// Another process was quicker.
     Elsewhere(IndentationState),
@@ -33,7 +33,7 @@ pub(super) enum Settled {
 }
 
 /// The indentations still to be solved, shared by the workers.
-pub(super) struct Queue<'a> {
+pub(crate) struct Queue<'a> {
     pub vertex_count: usize,
     pub workspace: &'a Workspace,
     pub todo: &'a [&'a Indentation],
@@ -46,7 +46,7 @@ pub(super) struct Queue<'a> {
 }
 
 impl Queue<'_> {
-    pub(super) fn run<S: IndentationSolver>(
+    pub(crate) fn run<S: IndentationSolver>(
         &self,
         threads: usize,
         build: &(impl Fn() -> Result<S, BoxError> + Sync),
@@ -88,7 +88,12 @@ impl Queue<'_> {
                 || self.press(press, &mut solver, build, events),
                 |state| Ok(Settled::Elsewhere(state)),
             ) {
-                Ok(settled) => self.push(Ok(settled)),
+                Ok(settled) => {
+                    if let Settled::Now(state) | Settled::Elsewhere(state) = &settled {
+                        self.options.count.settle(state);
+                    }
+                    self.push(Ok(settled));
+                }
                 Err(error) => self.fail(error),
             }
             // Who listens ends after this.

@@ -1,27 +1,25 @@
-"""Finite elements in this process: scenes as `fe-datagen` takes them, explained and solved state by state.
-
-`for state in papilla.fe.Scene("scenes/flat-press.toml").solve(): print(state.depth_mm, state.force_n)`
-"""
+"""Scenes as `fe-datagen` takes them, explained and solved state by state."""
 
 from __future__ import annotations
 
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import check
-from .errors import BadInput, BadScene
-from .model import native
-from .wire import SIDE_PX, WHOLE, Map
+from .. import check
+from ..errors import BadInput, BadScene
+from ..model import native
+from ..wire import SIDE_PX, WHOLE, Map
+from .source import Explanation, Source, read
 
 if TYPE_CHECKING:
-    from . import _native
+    from .. import _native
 
 Field = NDArray[np.float64]
 Progress = bool | Callable[[int, int, str], None] | None
@@ -180,17 +178,6 @@ class Solve(Iterator[State]):
             self._progress(done, self.states, words)
 
 
-class Explanation(dict[str, Any]):
-    """What a scene is going to simulate and cost: members of `fe-datagen explain --json`; `print` shows the text."""
-
-    def __init__(self, members: dict[str, Any], text: str) -> None:
-        super().__init__(members)
-        self.text = text
-
-    def __str__(self) -> str:
-        return self.text
-
-
 class Effect(NamedTuple):
     """What one effect of a scene costs and changes."""
 
@@ -215,9 +202,7 @@ class Scene:
     (docs/reference/scenes.md). Raises BadScene, whose `field` and `line` say where.
     """
 
-    def __init__(
-        self, source: str | os.PathLike[str] | Mapping[str, Any], *, pressure: ArrayLike | None = None
-    ) -> None:
+    def __init__(self, source: Source, *, pressure: ArrayLike | None = None) -> None:
         """`pressure` is a map (224, 224) on the finger's atlas, Pa, which presses in place of an indenter; it stands
         for `pressure.file` of the scene."""
         scene = native().Scene
@@ -225,13 +210,7 @@ class Scene:
         if pressure is not None:
             map_pa = np.ascontiguousarray(check.samples(pressure, WHOLE))
         self._pressure = map_pa
-        self._native: _native.Scene
-        if isinstance(source, Mapping):
-            self._native = scene(Path("scene.toml"), json.dumps(_plain(source)), True, map_pa)
-        elif isinstance(source, str) and "\n" in source:
-            self._native = scene(Path("scene.toml"), source, False, map_pa)
-        else:
-            self._native = scene(Path(source), None, False, map_pa)
+        self._native: _native.Scene = scene(*read(source), map_pa)
 
     def as_dict(self) -> dict[str, Any]:
         """All members of the scene, those too that were not given."""
@@ -295,16 +274,3 @@ class Scene:
 
 def _change(other: NDArray[Any], reference: NDArray[Any]) -> float:
     return float(np.linalg.norm(other - reference) / np.linalg.norm(reference))
-
-
-def _plain(value: Any) -> Any:
-    """Numbers, lists and dicts for JSON, of numpy's too."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(member) for name, member in value.items()}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return value.item()
-    return os.fspath(value) if isinstance(value, os.PathLike) else value

@@ -1,7 +1,7 @@
 //! Makes the manifest of a dataset from the records of all simulations.
 
-use super::CampaignError;
-use super::state::{IndentationState, Outcome, SOFTWARE};
+use crate::CampaignError;
+use crate::state::{IndentationState, Outcome, SOFTWARE};
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
 use papilla_dataset::{
@@ -12,7 +12,7 @@ use papilla_fingertip::scene::Pose;
 use papilla_output::OutputError;
 
 /// The manifest of all indentations, which stand in order of their ids.
-pub(super) fn manifest(
+pub(crate) fn manifest(
     spec: &CampaignSpec,
     atlas: &Atlas,
     states: &[IndentationState],

@@ -233,7 +233,7 @@ fn a_solver_that_cannot_be_built_stops_the_campaign() {
 /// The shipped dataset's poses: its seed has to give them for ever.
 #[test]
 fn the_poses_of_s1_are_those_of_the_shipped_dataset() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let s1 = CampaignSpec::read(&root.join("campaigns/s1-graded.toml")).unwrap();
     let shipped = Dataset::open(&root.join("data/s1-graded")).unwrap();
     let planned = indentations(&s1);
@@ -253,7 +253,7 @@ fn the_poses_of_s1_are_those_of_the_shipped_dataset() {
 /// What a campaign's file means stays what its shipped dataset was solved from, mesh and all.
 #[test]
 fn shipped_datasets_are_of_their_campaigns() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut seen = 0;
     for file in std::fs::read_dir(root.join("campaigns")).unwrap() {
         let file = file.unwrap().path();

@@ -3,7 +3,7 @@
 //! Read here and not by the crate `gltf`, which turns on a feature of serde_json in the whole
 //! workspace: positions, indices and the nodes' transforms are all that is needed.
 
-use crate::Surface;
+use crate::Mesh as Surface;
 use serde::Deserialize;
 
 /// `glTF`.

@@ -1,11 +1,12 @@
 //! The solver of a simulation as the campaign sees it, and the options of a run.
 
-use super::{Checkpoints, PressError};
+use crate::state::IndentationState;
+use crate::{Checkpoints, PressError};
 use papilla_dataset::Sample;
 use papilla_fingertip::campaign::{Indentation, Slice};
 use std::num::NonZero;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// Solves one indentation after another; each worker thread has its own.
@@ -24,6 +25,41 @@ pub trait IndentationSolver {
     ) -> Result<Vec<Sample>, PressError>;
 }
 
+/// How far a run is. The numbers only grow.
+#[derive(Debug, Default)]
+pub struct Count {
+    due: AtomicUsize,
+    done: AtomicUsize,
+    failed: AtomicUsize,
+}
+
+impl Count {
+    pub(crate) fn begin(&self, due: usize, known: &[IndentationState]) {
+        self.due.store(due, Ordering::Relaxed);
+        known.iter().for_each(|state| self.settle(state));
+    }
+
+    pub(crate) fn settle(&self, state: &IndentationState) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+        self.failed.fetch_add(usize::from(state.is_failed()), Ordering::Relaxed);
+    }
+
+    /// Indentations of the slice; 0 until they have been planned.
+    pub fn due(&self) -> usize {
+        self.due.load(Ordering::Relaxed)
+    }
+
+    /// Of those, the ones that are solved or failed, in this run or before.
+    pub fn done(&self) -> usize {
+        self.done.load(Ordering::Relaxed)
+    }
+
+    /// Of those, the ones that failed.
+    pub fn failed(&self) -> usize {
+        self.failed.load(Ordering::Relaxed)
+    }
+}
+
 /// How to run, as opposed to what.
 #[derive(Clone, Debug)]
 pub struct RunOptions {
@@ -33,6 +69,8 @@ pub struct RunOptions {
     pub threads: Option<NonZero<usize>>,
     /// Show on standard error how far it is.
     pub progress: bool,
+    /// How far it is, for whoever asks while it runs.
+    pub count: Arc<Count>,
     /// Try indentations again that failed in an earlier run.
     pub retry_failed: bool,
     /// Once it is true, every indentation is stored where it stands and the run ends.
@@ -47,6 +85,7 @@ impl Default for RunOptions {
             slice: Slice::WHOLE,
             threads: None,
             progress: true,
+            count: Arc::default(),
             retry_failed: true,
             stop: Arc::default(),
             checkpoint_every: Duration::from_secs(300),

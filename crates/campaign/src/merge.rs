@@ -1,8 +1,8 @@
 //! Makes the dataset from what the slices of a campaign have left in a folder.
 
-use super::assemble::manifest;
-use super::state::{Found, Workspace};
-use super::{CampaignError, CampaignReport};
+use crate::assemble::manifest;
+use crate::state::{Found, Workspace};
+use crate::{CampaignError, CampaignReport};
 use papilla_fingertip::campaign::{CampaignSpec, indentations};
 use papilla_output::atomic;
 use std::path::Path;

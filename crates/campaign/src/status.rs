@@ -1,8 +1,8 @@
 //! How far the slices of a campaign are, read from the files that they leave.
 
-use super::beat::{BEAT, Beat};
-use super::state::{Found, IndentationState, Outcome, Workspace};
-use super::{CampaignError, Failure};
+use crate::beat::{BEAT, Beat};
+use crate::state::{Found, IndentationState, Outcome, Workspace};
+use crate::{CampaignError, Failure};
 use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
 use papilla_output::OutputError;
 use papilla_progress::clock;
@@ -211,7 +211,7 @@ impl fmt::Display for Status {
                 (Some(_), _) => "stopped, to be started again".to_owned(),
                 (None, true) => "silent: lost?".to_owned(),
                 (None, false) => {
-                    let at = |r: &super::Running| {
+                    let at = |r: &crate::Running| {
                         format!("indentation {}, {} of {} states", r.press, r.states, r.states_due)
                     };
                     beat.running.iter().map(at).collect::<Vec<_>>().join("; ")

@@ -1,9 +1,9 @@
 //! Solves the simulations of a slice in parallel.
 
-use super::beat::{Beat, Ended};
-use super::queue::{Queue, Settled, settled};
-use super::state::{Found, Workspace};
-use super::{BoxError, CampaignError, IndentationSolver, RunOptions, SliceReport};
+use crate::beat::{Beat, Ended};
+use crate::queue::{Queue, Settled, settled};
+use crate::state::{Found, Workspace};
+use crate::{BoxError, CampaignError, IndentationSolver, RunOptions, SliceReport};
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
 use papilla_dataset::TriangleOnLattice;
@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::time::Instant;
 
 /// Solves a slice of a campaign into `folder`, which many slices may share, or goes on with it;
-/// [`merge`](super::merge) makes the dataset. `solver` builds one solver per worker thread, with
+/// [`merge`](crate::merge) makes the dataset. `solver` builds one solver per worker thread, with
 /// values on `atlas`, or on cells of a lattice on which its triangles lie.
 ///
 /// # Errors
@@ -47,6 +47,7 @@ pub fn solve<S: IndentationSolver>(
         }
     }
     let reused = known.len();
+    options.count.begin(planned.len(), &known);
     let cores = options.threads.or_else(|| std::thread::available_parallelism().ok());
     let threads = cores.map_or(1, NonZero::get).min(todo.len().max(1));
     let progress = Progress::new("indentations", reused + todo.len(), reused, !options.progress);

@@ -1,6 +1,6 @@
 //! The reports of a slice and of a merged campaign.
 
-use super::state::{IndentationState, Outcome};
+use crate::state::{IndentationState, Outcome};
 use papilla_dataset::{DroppedSample, FailedIndentation};
 use papilla_fingertip::campaign::{CampaignSpec, Slice};
 use papilla_progress::clock;
@@ -48,7 +48,7 @@ pub struct SliceReport {
 }
 
 impl SliceReport {
-    pub(super) fn new(
+    pub(crate) fn new(
         spec: &CampaignSpec,
         folder: &Path,
         slice: Slice,

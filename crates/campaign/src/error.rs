@@ -2,6 +2,7 @@
 
 use papilla_dataset::DatasetError;
 use papilla_fingertip::campaign::SpecError;
+use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
 use std::path::PathBuf;
 
@@ -15,8 +16,14 @@ pub enum CampaignError {
     /// The campaign cannot be read, or makes no sense.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// It has nothing to press, or to press with.
+    #[error("the campaign has not got {0}")]
+    Lacks(&'static str),
+    /// Its finger cannot be made.
+    #[error(transparent)]
+    SetUp(#[from] SimulationError),
     /// The folder belongs to something else.
-    #[error("{folder} holds {what}: choose another --out, or remove the folder to start over")]
+    #[error("{folder} holds {what}: choose another folder, or remove this one to start over")]
     Occupied {
         /// The output folder.
         folder: PathBuf,
@@ -24,15 +31,15 @@ pub enum CampaignError {
         what: &'static str,
     },
     /// Nothing has been solved there.
-    #[error("{folder} holds no campaign: `fe-datagen generate` begins one")]
+    #[error("{folder} holds no campaign that was begun")]
     NotBegun {
         /// The folder.
         folder: PathBuf,
     },
     /// Not every indentation is solved.
     #[error(
-        "{missing} of {presses} indentations are not solved, the first: {first}. Run \
-         `fe-datagen generate` on their slices, or without a slice, and merge again"
+        "{missing} of {presses} indentations are not solved, the first: {first}. Run the campaign \
+         on their slices, or without a slice, and merge again"
     )]
     Holes {
         /// How many are missing.

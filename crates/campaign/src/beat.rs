@@ -9,7 +9,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Longest time without a word.
-pub(super) const BEAT: Duration = Duration::from_secs(60);
+pub(crate) const BEAT: Duration = Duration::from_secs(60);
 /// Shortest time between two: thousands of processes tell one file system.
 const BEAT_MIN: Duration = Duration::from_secs(30);
 
@@ -55,13 +55,13 @@ pub struct Beat {
 }
 
 /// What happens to an indentation.
-pub(super) enum Event {
+pub(crate) enum Event {
     Reached(Running),
     Done(usize),
 }
 
 impl Beat {
-    pub(super) fn new(slice: Slice) -> Self {
+    pub(crate) fn new(slice: Slice) -> Self {
         let job = std::env::var("SLURM_JOB_ID").ok();
         let (node, process) = (node(), std::process::id());
         Self { slice, node, process, job, running: Vec::new(), ended: None }
@@ -82,7 +82,7 @@ impl Beat {
     }
 
     /// Another process that has just been heard of at the same slice.
-    pub(super) fn other(&self, folder: &Path) -> Option<(Self, Duration)> {
+    pub(crate) fn other(&self, folder: &Path) -> Option<(Self, Duration)> {
         let path = Self::path(folder, self.slice);
         let found: Self = atomic::read_json(&path).ok()?;
         let heard = age(&path)?;
@@ -99,7 +99,7 @@ impl Beat {
     }
 
     /// Tells of everything that happens until nothing can any more.
-    pub(super) fn follow(&mut self, folder: &Path, events: &Receiver<Event>) {
+    pub(crate) fn follow(&mut self, folder: &Path, events: &Receiver<Event>) {
         let (mut last, mut news) = (None::<Instant>, false);
         loop {
             match events.recv_timeout(if news { BEAT_MIN } else { BEAT }) {
@@ -119,14 +119,14 @@ impl Beat {
     }
 
     /// The last word.
-    pub(super) fn end(&mut self, folder: &Path, ended: Ended) {
+    pub(crate) fn end(&mut self, folder: &Path, ended: Ended) {
         self.running.clear();
         self.ended = Some(ended);
         self.write(folder);
     }
 
     /// The last words in a folder, and how long ago they were written.
-    pub(super) fn all(folder: &Path) -> Result<Vec<(Self, Duration)>, OutputError> {
+    pub(crate) fn all(folder: &Path) -> Result<Vec<(Self, Duration)>, OutputError> {
         let progress = folder.join("progress");
         let entries = std::fs::read_dir(&progress).map_err(OutputError::io("list", &progress))?;
         let mut all = Vec::new();

@@ -1,6 +1,6 @@
 //! Checkpoints: how far a simulation has come, stored so that another process can go on with it.
 
-use super::BoxError;
+use crate::BoxError;
 use papilla_output::OutputError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -40,7 +40,7 @@ pub struct Checkpoints<'a> {
 
 impl<'a> Checkpoints<'a> {
     /// For an indentation of so many stored depths of which an earlier process `stored` something.
-    pub(super) fn new(
+    pub(crate) fn new(
         states: usize,
         stored: Option<Vec<u8>>,
         store: &'a dyn Fn(&[u8]) -> Result<(), OutputError>,
