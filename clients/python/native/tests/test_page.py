@@ -18,4 +18,4 @@ def test_an_example_runs_as_it_is_written(block, tmp_path):
 
 
 def test_the_page_has_examples():
-    assert len(BLOCKS) == 7
+    assert len(BLOCKS) == 8
