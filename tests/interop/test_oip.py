@@ -53,6 +53,17 @@ def test_without_a_wish_the_client_gets_bytes(client, pressure_pa, sed_j_per_m3)
     assert answer.get_output("sed_j_per_m3")["parameters"]["binary_data_size"] == sed_j_per_m3.nbytes
 
 
+def test_a_finger_is_named_in_the_address(client, pressure_pa, sed_j_per_m3):
+    named = {"query_params": {"finger": "default"}}
+    assert client.get_model_metadata("nano", **named)["name"] == "nano"
+    answer = client.infer("nano", [tensor(pressure_pa, True)], **named)
+    np.testing.assert_array_equal(answer.as_numpy("sed_j_per_m3"), sed_j_per_m3)
+    with pytest.raises(InferenceServerException, match="no finger 'nobody'"):
+        client.infer("nano", [tensor(pressure_pa, True)], query_params={"finger": "nobody"})
+    with pytest.raises(InferenceServerException, match="named in the address"):
+        client.infer("nano", [tensor(pressure_pa, True)], parameters={"finger": "default"})
+
+
 def test_many_at_once(client, pressure_pa):
     factors = [0.1 * (1 + n % 9) for n in range(24)]
     asked = [client.async_infer("nano", [tensor(np.float32(f) * pressure_pa, True)]) for f in factors]

@@ -130,9 +130,13 @@ def sed(
     return post(pressure_pa, url=url, finger=finger, tier=tier, budget_us=budget_us, token=token).sed
 
 
-def indentation(number: int = 0, *, url: str = DEFAULT_URL, token: str | None = None) -> Indentation:
-    """One of the FE indentations that the service ships: input and truth."""
-    name = get_json(url, "/v1/presses", token)["presses"][number]["name"]
-    maps = [_array(request(url, f"/v1/presses/{number}/{what}", None, _NPY, token)[0]) for what in ("pressure", "sed")]
+def indentation(
+    number: int = 0, *, url: str = DEFAULT_URL, finger: str | None = None, token: str | None = None
+) -> Indentation:
+    """One of the FE indentations that the service ships: input and truth. `finger` by name, or the default one."""
+    query = "" if finger is None else "?" + urllib.parse.urlencode({"finger": finger})
+    name = get_json(url, "/v1/presses" + query, token)["presses"][number]["name"]
+    paths = [f"/v1/presses/{number}/{what}{query}" for what in ("pressure", "sed")]
+    maps = [_array(request(url, path, None, _NPY, token)[0]) for path in paths]
     assert all(map_.shape == (SIDE_PX, SIDE_PX) for map_ in maps)
     return Indentation(name, *maps)

@@ -47,6 +47,10 @@ def test_asyncio_sessions_side_by_side(url):
 
 def test_the_indentations_of_the_service_are_rendered_as_its_card_promises(url):
     indentation = papilla.indentation(0, url=url)
+    named = papilla.indentation(0, url=url, finger="default")
+    assert named.name == indentation.name and (named.sed_j_per_m3 == indentation.sed_j_per_m3).all()
+    with pytest.raises(papilla.Refused, match="no finger 'nobody'"):
+        papilla.indentation(0, url=url, finger="nobody")
     rendered = papilla.sed(indentation.pressure_pa, url=url)
     error = np.linalg.norm(rendered - indentation.sed_j_per_m3) / np.linalg.norm(indentation.sed_j_per_m3)
     assert error < 0.3, f"relative L2 {error}"

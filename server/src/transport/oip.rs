@@ -1,6 +1,7 @@
 //! The Open Inference Protocol, version 2, over HTTP: existing clients work unmodified.
 //!
-//! `papilla-oip` reads requests and writes answers. Every tier is a model of version 1.
+//! `papilla-oip` reads requests and writes answers. Every tier is a model of version 1; the
+//! parameter `finger` of an address says of which finger, as on all other routes.
 
 use std::{
     sync::Arc,
@@ -22,7 +23,10 @@ use serde_json::json;
 use tokio::task::spawn_blocking;
 
 use crate::{
-    core::scheduler::{Job, JobOptions},
+    core::{
+        catalogue::Catalogue,
+        scheduler::{Job, JobOptions},
+    },
     problem,
     transport::{
         answer::{
@@ -33,6 +37,7 @@ use crate::{
         app::App,
         first_use,
         gate::Principal,
+        http::finger,
     },
 };
 
@@ -65,10 +70,13 @@ pub(crate) async fn ready(State(app): Shared) -> Answer {
     }
 }
 
-pub(crate) async fn model(State(app): Shared, uri: Uri) -> Answer {
-    let catalogue = app.catalogue();
-    let place = match named(&app, &uri) {
-        Ok(place) => place,
+pub(crate) async fn model(
+    State(app): Shared,
+    Extension(caller): Extension<Principal>,
+    uri: Uri,
+) -> Answer {
+    let (catalogue, place) = match named(&app, &caller, &uri).await {
+        Ok(named) => named,
         Err(problem) => return refuse(&app, problem),
     };
     let tier = &catalogue.tiers[place];
@@ -82,26 +90,36 @@ pub(crate) async fn model(State(app): Shared, uri: Uri) -> Answer {
     })))
 }
 
-pub(crate) async fn model_ready(State(app): Shared, uri: Uri) -> Answer {
-    match named(&app, &uri) {
+pub(crate) async fn model_ready(
+    State(app): Shared,
+    Extension(caller): Extension<Principal>,
+    uri: Uri,
+) -> Answer {
+    match named(&app, &caller, &uri).await {
         Ok(_) if app.is_draining() => refuse(&app, problem::shutting_down()),
         Ok(_) => Ok(json_answer(&json!({"ready": true}))),
         Err(problem) => refuse(&app, problem),
     }
 }
 
-/// The place of the tier that `/v2/models/{model}[/versions/{version}]` names.
-fn named(app: &App, uri: &Uri) -> Result<usize, Problem> {
+/// The tier that `/v2/models/{model}[/versions/{version}]` names, with `?finger=` of that finger:
+/// its place in the finger's catalogue.
+async fn named(
+    app: &Arc<App>,
+    caller: &Principal,
+    uri: &Uri,
+) -> Result<(Arc<Catalogue>, usize), Problem> {
+    let catalogue = finger::asked(app, caller, uri).await?.catalogue;
     let mut parts = uri.path().split('/').skip(3);
     let model = parts.next().unwrap_or_default();
-    let place = app.catalogue().tier_named(model)?;
+    let place = catalogue.tier_named(model)?;
     match (parts.next(), parts.next()) {
         (Some("versions"), Some(version)) if version != VERSION => {
             let version = shortened(version);
             let message = format!("model {model} has no version '{version}', only {VERSION}");
             Err(Problem::new(ErrorCode::UnknownTier, message).at("version"))
         }
-        _ => Ok(place),
+        _ => Ok((catalogue, place)),
     }
 }
 
@@ -128,7 +146,8 @@ async fn answer(
     let body = body::read(headers, body, app.body_max, app.timeouts.io).await?;
     body::require_plain(headers)?;
     let received = Instant::now();
-    let tier = named(app, uri)?;
+    let (catalogue, place) = named(app, principal, uri).await?;
+    let tier = catalogue.tier_number(place);
     first_use::wait(app, tier, principal.client.as_ref(), app.timeouts.io).await?;
     // Held until the answer is written: it bounds the work below as well.
     let _place = app.admit_request()?;
@@ -146,8 +165,7 @@ async fn answer(
     };
     let client = principal.client.as_ref();
     let Rendered { bytes, timings, .. } = through_pool(app, job, Transport::Oip, client).await?;
-    let catalogue = app.catalogue();
-    let name = catalogue.tiers[tier].name.clone();
+    let name = catalogue.tiers[place].name.clone();
     let mut response = encode(name.clone(), request, bytes.freeze()).await?;
     timings.label(response.headers_mut(), &name);
     Ok(response)

@@ -2,7 +2,10 @@
 
 use serde_json::{Value, json};
 
-use crate::support::{Answer, GAIN, Service, assert_rendered, bytes_of, floats_of, ramp};
+use crate::{
+    fingers::support as fingers,
+    support::{Answer, GAIN, Service, assert_rendered, bytes_of, floats_of, ramp},
+};
 
 fn request(members: &Value) -> Value {
     let mut input = json!({"name": "pressure_pa", "shape": [1, 1, 224, 224], "datatype": "FP32"});
@@ -111,6 +114,45 @@ async fn what_cannot_be_inferred_is_refused_in_words_of_the_protocol() {
     assert_refused(&unknown, 404, "unknown_tier");
     let zero = request(&json!({"data": vec![0.0; ramp().len()]}));
     assert_eq!(infer(zero.to_string()).await.status, 200);
+}
+
+/// A model is that of the finger in the address.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_named_finger_has_its_own_models() {
+    let folder = fingers::folder();
+    let service = fingers::service(&folder).await;
+    assert_refused(&service.get("/v2/models/own").send().await, 404, "unknown_tier");
+    assert_eq!(service.json("/v2/models/own?finger=thumb").await["name"], "own");
+    assert_eq!(service.get("/v2/models/own/ready?finger=thumb").send().await.status, 200);
+    assert_refused(&service.get("/v2/models/slow?finger=thumb").send().await, 404, "unknown_tier");
+    let wish = request(&json!({"data": ramp()}));
+    for (path, gain) in [
+        ("/v2/models/own/infer?finger=thumb", fingers::THUMB_GAIN),
+        ("/v2/models/own/versions/1/infer?finger=thumb", fingers::THUMB_GAIN),
+        ("/v2/models/quick/infer?finger=thumb", 0.9 * fingers::THUMB_GAIN),
+        ("/v2/models/quick/infer?finger=default", GAIN),
+        ("/v2/models/quick/infer", GAIN),
+    ] {
+        let answer = service.post(path, wish.to_string()).send().await;
+        assert_eq!(answer.status, 200, "{path}: {}", answer.text());
+        let sed = &answer.json()["outputs"][0]["data"];
+        let at = 112 * 224 + 112;
+        let ratio = sed[at].as_f64().unwrap() as f32 / ramp()[at];
+        assert!((ratio - gain).abs() < 1e-4, "{path}: {ratio}");
+    }
+    for (path, status, code) in [
+        ("/v2/models/quick/infer?finger=nobody", 404, "not_found"),
+        ("/v2/models/quick/infer?finger=thumb&finger=default", 400, "bad_query"),
+    ] {
+        assert_refused(&service.post(path, wish.to_string()).send().await, status, code);
+    }
+    assert_refused(&service.get("/v2/models/quick?finger=nobody").send().await, 404, "not_found");
+    // Elsewhere than in the address it would be passed over, and the default finger would answer.
+    let mut wish = wish;
+    wish["parameters"] = json!({"finger": "thumb"});
+    let answer = service.post("/v2/models/quick/infer", wish.to_string()).send().await;
+    assert_refused(&answer, 400, "bad_query");
+    assert!(answer.text().contains("?finger=thumb"), "{}", answer.text());
 }
 
 /// A parameter that would change the answer is refused where it is not served.

@@ -91,6 +91,7 @@ impl Request {
         };
         let head: Head = json::read_bounded(&head)?;
         refuse_sequences(&head.parameters)?;
+        refuse_finger(&head.parameters)?;
         let is_binary_wanted = wants_binary(&head)?;
         let timeout_us = head.parameters.timeout.whole_number("timeout")?.filter(|us| *us > 0);
         let pressure_pa = samples(head.inputs, blob)?;
@@ -134,6 +135,15 @@ fn refuse_sequences(parameters: &Parameters) -> Result<(), Problem> {
             Err(Problem::new(ErrorCode::BadQuery, message).at(name))
         }
     }
+}
+
+/// The finger is part of the address: clients ask with the same one what its models are.
+fn refuse_finger(parameters: &Parameters) -> Result<(), Problem> {
+    if !parameters.finger.is_there() {
+        return Ok(());
+    }
+    let message = "a finger is named in the address, as in ?finger=thumb, not in the parameters";
+    Err(Problem::new(ErrorCode::BadQuery, message).at("finger"))
 }
 
 fn check_input(input: &InputTensor) -> Result<(), Problem> {

@@ -22,6 +22,8 @@ pub(super) struct Parameters {
     #[serde(default)]
     pub(super) classification: Parameter,
     #[serde(default)]
+    pub(super) finger: Parameter,
+    #[serde(default)]
     sequence_id: Parameter,
     #[serde(default)]
     sequence_start: Parameter,

@@ -78,6 +78,8 @@ fn what_the_model_does_not_take_is_refused_by_field() {
     assert_eq!(output(classes).0, ErrorCode::WrongType);
     assert_eq!(with("inputs", json!([])).0, ErrorCode::WrongShape);
     assert_eq!(with("parameters", json!({"timeout": -1})).1.as_deref(), Some("timeout"));
+    let elsewhere = with("parameters", json!({"finger": "thumb"}));
+    assert_eq!(elsewhere, (ErrorCode::BadQuery, Some("finger".to_owned())));
     for bad in ["", "{", "[]", "{\"inputs\": 1}", "{\"inputs\": [{\"data\": [\"a\"]}]}"] {
         let error = Request::read(&Bytes::from(bad), None).unwrap_err();
         assert_eq!(error.code, ErrorCode::BadJson, "{bad}");

@@ -177,7 +177,9 @@ impl Catalogue {
         let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
         let pixels = [skin.pixel_count(), interface.pixel_count()];
         let replay = match assets.get("replay.json") {
-            Some(json) => Replay::parse(json, pixels).map_err(|e| bad("replay.json", &e))?,
+            Some(json) => {
+                Replay::parse(json, pixels, atlas.hash()).map_err(|e| bad("replay.json", &e))?
+            }
             None => Replay::default(),
         };
         let states = golden::States { replay: &replay, skin: &skin, interface: &interface };

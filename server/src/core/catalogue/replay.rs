@@ -24,18 +24,28 @@ pub(crate) struct State {
 /// `models/replay.json`.
 #[derive(Debug, Default, Deserialize)]
 pub(crate) struct Replay {
+    /// Hash of the atlas that the states are drawn on; files that were written by hand may lack it.
+    #[serde(default)]
+    atlas_hash: Option<String>,
     #[serde(rename = "presses")]
     pub(crate) states: Vec<State>,
 }
 
 impl Replay {
-    /// Reads and checks the file. `pixels` are the numbers of pixels of skin and of interface.
+    /// Reads and checks the file. `pixels` are the numbers of pixels of skin and of interface on
+    /// the atlas with the hash `atlas_hash`.
     ///
     /// # Errors
-    /// The JSON is not of the expected form, a value is negative or not finite, or a state does not
-    /// fit the atlas.
-    pub(crate) fn parse(text: &[u8], pixels: [usize; 2]) -> Result<Self, String> {
+    /// The JSON is not of the expected form, a value is negative or not finite, or the states are of
+    /// another atlas or do not fit this one.
+    pub(crate) fn parse(text: &[u8], pixels: [usize; 2], atlas_hash: &str) -> Result<Self, String> {
         let replay: Self = json::read(text).map_err(|e| e.to_string())?;
+        if let Some(other) = replay.atlas_hash.as_ref().filter(|hash| *hash != atlas_hash) {
+            return Err(format!(
+                "its presses are of the atlas {other}, and atlas.json is {atlas_hash}: make it anew \
+                 with `fe-datagen dataset replay`, or take it away"
+            ));
+        }
         for (index, state) in replay.states.iter().enumerate() {
             for (what, values, due) in [
                 ("pressure_pa", &state.pressure_pa, pixels[0]),
@@ -67,7 +77,7 @@ mod tests {
             r#"{{"presses": [{{"name": "flat", "pose": {{"pitch_deg": 0}}, "depth_mm": 1,
                 "pressure_pa": {pressure}, "sed_j_per_m3": {sed}}}]}}"#
         );
-        Replay::parse(json.as_bytes(), [2, 2])
+        Replay::parse(json.as_bytes(), [2, 2], "own")
     }
 
     #[test]
@@ -77,6 +87,12 @@ mod tests {
         assert!(parse("[1, 2]", "[0, 3, 4]").unwrap_err().contains("sed_j_per_m3"));
         assert!(parse("[1, -2]", "[0, 3]").unwrap_err().contains("negative"));
         assert!(parse("[1, 1e39]", "[0, 3]").is_err());
-        assert!(Replay::parse(b"{", [2, 2]).is_err());
+        assert!(Replay::parse(b"{", [2, 2], "own").is_err());
+        let of = |hash: &str| {
+            let text = format!(r#"{{"atlas_hash": "{hash}", "presses": []}}"#);
+            Replay::parse(text.as_bytes(), [2, 2], "own")
+        };
+        assert!(of("own").unwrap().states.is_empty());
+        assert!(of("other").unwrap_err().contains("atlas other"));
     }
 }

@@ -1,16 +1,34 @@
 //! `GET /v1/effects`: what a session can ask for, and what that costs here.
 
-use axum::{extract::State, response::Response};
+use axum::{
+    extract::{Extension, State},
+    http::Uri,
+};
 use papilla_proto::RuntimeEffect;
+use papilla_session_contact::ContactAssets;
 use serde_json::{Value, json};
 
-use crate::transport::answer::{Shared, json_answer};
+use crate::{
+    core::fingers::Loaded,
+    transport::{
+        answer::{Answer, Shared, json_answer, refuse},
+        gate::Principal,
+        http::finger,
+    },
+};
 
-pub(crate) async fn list(State(app): Shared) -> Response {
-    let catalogue = app.catalogue();
+pub(crate) async fn list(
+    State(app): Shared,
+    Extension(caller): Extension<Principal>,
+    uri: Uri,
+) -> Answer {
+    let Loaded { catalogue, contact } = match finger::asked(&app, &caller, &uri).await {
+        Ok(finger) => finger,
+        Err(problem) => return refuse(&app, problem),
+    };
     let costs = catalogue.runtime.costs();
     // It is of the contact model, and timed with it.
-    let shear_us = app.contact().and_then(|contact| contact.shear_us());
+    let shear_us = contact.as_deref().and_then(ContactAssets::shear_us);
     let of_traction =
         |effect| shear_us.filter(|_| effect == RuntimeEffect::ShearEnergy).map(|us| us as f64);
     let of_sessions = RuntimeEffect::ALL.into_iter().map(|effect| {
@@ -31,5 +49,5 @@ pub(crate) async fn list(State(app): Shared) -> Response {
         json!({"name": name, "of": "tier", "tiers": tiers})
     });
     let effects: Vec<Value> = of_sessions.chain(of_tiers).collect();
-    json_answer(&json!({"effects": effects}))
+    Ok(json_answer(&json!({"effects": effects})))
 }

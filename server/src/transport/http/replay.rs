@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::{
-    extract,
+    extract::{Extension, State as AppState},
     http::{HeaderMap, Uri},
 };
 use bytes::BytesMut;
@@ -11,6 +11,7 @@ use papilla_codec::{Map, Output, Quantity, encode};
 use papilla_proto::{
     ErrorCode, MAP_LEN, Problem,
     atlas::{AtlasError, Raster, VertexSampler},
+    contact::DEFAULT_FINGER,
     error::shortened,
 };
 use serde_json::{Value, json};
@@ -23,12 +24,25 @@ use crate::{
     problem,
     transport::{
         answer::{Answer, Shared, cached, refuse},
+        app::App,
+        gate::Principal,
+        http::finger,
         negotiate,
     },
 };
 
-pub(crate) async fn list(extract::State(app): Shared, headers: HeaderMap) -> Answer {
-    let catalogue = app.catalogue();
+type Caller = Extension<Principal>;
+
+pub(crate) async fn list(
+    AppState(app): Shared,
+    Extension(caller): Caller,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Answer {
+    let catalogue = match finger::asked(&app, &caller, &uri).await {
+        Ok(finger) => finger.catalogue,
+        Err(problem) => return refuse(&app, problem),
+    };
     let of = Arc::clone(&catalogue);
     let make = move || {
         let states = of.replay.states.iter().enumerate().map(|(id, state)| {
@@ -42,8 +56,17 @@ pub(crate) async fn list(extract::State(app): Shared, headers: HeaderMap) -> Ans
     made.or_else(|problem| refuse(&app, problem))
 }
 
-/// The number of the state in the path, `/v1/presses/{press}`.
-///
+/// The finger that is asked about, and the number of the state in the path, `/v1/presses/{press}`.
+async fn asked(
+    app: &Arc<App>,
+    caller: &Principal,
+    uri: &Uri,
+) -> Result<(Arc<Catalogue>, usize), Problem> {
+    let catalogue = finger::asked(app, caller, uri).await?.catalogue;
+    let state = find(&catalogue, uri)?;
+    Ok((catalogue, state))
+}
+
 /// Taken from the raw path: axum's own extractor would refuse broken percent-encoding in
 /// words that are not our JSON.
 fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
@@ -52,9 +75,14 @@ fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
     let found = asked.parse().ok().filter(|id: &usize| *id < states.len());
     found.ok_or_else(|| {
         let message = if states.is_empty() {
-            "this service has no press to replay: `fe-datagen dataset replay DATASET --out MODELS` \
-             makes the replay.json of its folder of models"
-                .into()
+            let (of, folder) = match &*catalogue.name {
+                DEFAULT_FINGER => ("this service".to_owned(), "models"),
+                name => (format!("finger '{name}'"), "this finger"),
+            };
+            format!(
+                "{of} has no press to replay: `fe-datagen dataset replay DATASET --out FOLDER` \
+                 makes the replay.json of the folder of {folder}"
+            )
         } else {
             let asked = shortened(asked);
             format!("no press '{asked}'; there are {}, counted from 0", states.len())
@@ -64,10 +92,14 @@ fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
 }
 
 /// Values read from the maps at the atlas' vertices, in its order.
-pub(crate) async fn one(extract::State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    let catalogue = app.catalogue();
-    let state = match find(&catalogue, &uri) {
-        Ok(state) => state,
+pub(crate) async fn one(
+    AppState(app): Shared,
+    Extension(caller): Caller,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Answer {
+    let (catalogue, state) = match asked(&app, &caller, &uri).await {
+        Ok(asked) => asked,
         Err(problem) => return refuse(&app, problem),
     };
     let of = Arc::clone(&catalogue);
@@ -91,24 +123,25 @@ pub(crate) async fn one(extract::State(app): Shared, uri: Uri, headers: HeaderMa
 }
 
 /// The pressure as a map, ready to be posted.
-pub(crate) async fn pressure(app: Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    map(app, &uri, &headers, Quantity::Pressure).await
+pub(crate) async fn pressure(app: Shared, caller: Caller, uri: Uri, headers: HeaderMap) -> Answer {
+    map(app, caller, &uri, &headers, Quantity::Pressure).await
 }
 
 /// The FE solver's SED as a map.
-pub(crate) async fn sed(app: Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    map(app, &uri, &headers, Quantity::Sed).await
+pub(crate) async fn sed(app: Shared, caller: Caller, uri: Uri, headers: HeaderMap) -> Answer {
+    map(app, caller, &uri, &headers, Quantity::Sed).await
 }
 
 async fn map(
-    extract::State(app): Shared,
+    AppState(app): Shared,
+    Extension(caller): Caller,
     uri: &Uri,
     headers: &HeaderMap,
     quantity: Quantity,
 ) -> Answer {
-    let catalogue = app.catalogue();
-    let asked = find(&catalogue, uri).and_then(|state| Ok((state, negotiate::output(headers)?)));
-    let (state, output) = match asked {
+    let asked = asked(&app, &caller, uri).await;
+    let asked = asked.and_then(|(of, state)| Ok((of, state, negotiate::output(headers)?)));
+    let (catalogue, state, output) = match asked {
         Ok(asked) => asked,
         Err(problem) => return refuse(&app, problem),
     };

@@ -2,10 +2,11 @@
 
 mod refusals;
 mod reload;
-mod support;
+pub(crate) mod support;
 
 use papilla_proto::{
     FrameHeader, FrameStatus, SampleType,
+    atlas::{Patch, Raster},
     contact::{TOUCH_LEN, Touch},
     flags,
 };
@@ -15,7 +16,7 @@ use self::support::{THUMB_GAIN, add, folder, index, named, service, service_of, 
 use crate::support::{
     GAIN, PRESSURE_MAX_PA, Service, Socket, add_model_of_gain, bytes_of,
     contact::{atlas, atlas_of, ball_hello, deep, rows},
-    floats_of, frame, hello, ramp,
+    floats_of, frame, hello, ramp, write,
 };
 
 /// The next answer but for what took how long: its flags, and its payload with no time of the solve.
@@ -184,6 +185,56 @@ async fn a_finger_answers_over_http_too() {
             "{path}"
         );
     }
+}
+
+/// Whatever tells of a finger tells of the one that is named.
+#[tokio::test(flavor = "multi_thread")]
+async fn presses_and_effects_are_those_of_the_named_finger() {
+    let fingers = folder();
+    let service = service(&fingers).await;
+    let (of_default, of_thumb) = ("/v1/presses", "/v1/presses?finger=thumb");
+    // The default finger's press is not shown for another one.
+    assert_eq!(service.json(of_default).await["presses"].as_array().unwrap().len(), 1);
+    let none = service.json(of_thumb).await;
+    assert_eq!((&none["atlas_hash"], &none["presses"]), (&json!(thumb_atlas().hash()), &json!([])));
+    for path in ["/v1/presses/0", "/v1/presses/0/pressure", "/v1/presses/0/sed"] {
+        let answer = service.get(&format!("{path}?finger=thumb")).send().await;
+        assert_eq!(answer.status, 404, "{path}");
+        assert!(answer.text().contains("finger 'thumb' has no press"), "{}", answer.text());
+        let answer = service.get(&format!("{path}?finger=nobody")).send().await;
+        assert_eq!(answer.json()["error"]["field"], "finger", "{path}");
+    }
+    // One of its own is.
+    let thumb = fingers.path().join("thumb");
+    let pixels =
+        [Patch::Skin, Patch::Interface].map(|p| Raster::new(&thumb_atlas(), p).pixels().len());
+    let state = json!({"name": "own", "depth_mm": 0.5, "pressure_pa": vec![100.0; pixels[0]],
+        "sed_j_per_m3": vec![100.0 * THUMB_GAIN; pixels[1]]});
+    let replay = |hash: &str| json!({"atlas_hash": hash, "presses": [state]}).to_string();
+    write(&thumb, "replay.json", replay(thumb_atlas().hash()).as_bytes());
+    assert_eq!(service.post("/v1/admin/reload", "").send().await.status, 200);
+    assert_eq!(service.json(of_thumb).await["presses"][0]["name"], "own");
+    let sed = service.get("/v1/presses/0/sed?finger=thumb").send().await;
+    let greatest = floats_of(&sed.body).into_iter().fold(0.0, f32::max);
+    assert!((greatest - 100.0 * THUMB_GAIN).abs() < 1e-3, "{greatest}");
+    // One of another atlas is not.
+    write(&thumb, "replay.json", replay(atlas().hash()).as_bytes());
+    let answer = service.post("/v1/admin/reload", "").send().await;
+    assert!(answer.status == 422 && answer.text().contains("replay.json"), "{}", answer.text());
+
+    let tiers = |listed: &Value| -> Vec<Value> {
+        let effects = listed["effects"].as_array().unwrap();
+        effects.iter().filter(|e| e["of"] == "tier").map(|e| e["tiers"].clone()).collect()
+    };
+    let own = tiers(&service.json("/v1/effects?finger=thumb").await);
+    assert!(
+        !own.is_empty() && own.iter().all(|tiers| *tiers == json!(["own", "quick"])),
+        "{own:?}"
+    );
+    let default = tiers(&service.json("/v1/effects").await);
+    assert!(default.iter().all(|tiers| *tiers == json!(["quick", "slow"])), "{default:?}");
+    let answer = service.get("/v1/effects?finger=nobody").send().await;
+    assert_eq!((answer.status, &answer.json()["error"]["code"]), (404, &json!("not_found")));
 }
 
 /// A finger that has no network of its own says so: in ready, and with every answer.

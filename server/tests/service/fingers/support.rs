@@ -15,21 +15,21 @@ use crate::support::{
 };
 
 /// What the network of `thumb` multiplies the pressure by.
-pub(super) const THUMB_GAIN: f32 = 0.7;
+pub(crate) const THUMB_GAIN: f32 = 0.7;
 
 /// A folder of fingers: `thumb`, which is larger, twice as stiff and has a network of its own.
-pub(super) fn folder() -> TempDir {
+pub(crate) fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     add(folder.path(), "thumb", &thumb_atlas(), THUMB_GAIN);
     folder
 }
 
-pub(super) fn thumb_atlas() -> Atlas {
+pub(crate) fn thumb_atlas() -> Atlas {
     atlas_of(0.12)
 }
 
 /// Writes a finger with the tiers `own` (its default) and `quick`, and a contact model.
-pub(super) fn add(fingers: &Path, name: &str, atlas: &Atlas, gain: f32) {
+pub(crate) fn add(fingers: &Path, name: &str, atlas: &Atlas, gain: f32) {
     let folder = fingers.join(name);
     fs::create_dir_all(&folder).unwrap();
     write(&folder, "finger.toml", b"[source]\nwho = \"nobody\"\n");
@@ -40,16 +40,16 @@ pub(super) fn add(fingers: &Path, name: &str, atlas: &Atlas, gain: f32) {
     write(&folder, "finger.contact", &model_on(atlas, 2.0 * MODULUS_MPA));
 }
 
-pub(super) fn index(folder: &Path, index: &Value) {
+pub(crate) fn index(folder: &Path, index: &Value) {
     write(folder, "index.json", index.to_string().as_bytes());
 }
 
 /// A service whose default finger is the plane of the contact tests, with these fingers.
-pub(super) async fn service(fingers: &TempDir) -> Service {
+pub(crate) async fn service(fingers: &TempDir) -> Service {
     service_with(fingers, |_| ()).await
 }
 
-pub(super) async fn service_with(fingers: &TempDir, change: impl FnOnce(&mut Config)) -> Service {
+pub(crate) async fn service_with(fingers: &TempDir, change: impl FnOnce(&mut Config)) -> Service {
     let models = model_folder_on(&atlas());
     write(models.path(), "finger.contact", &model());
     let of_fingers = |config: &mut Config| {
@@ -62,7 +62,7 @@ pub(super) async fn service_with(fingers: &TempDir, change: impl FnOnce(&mut Con
 }
 
 /// A service that has one of these fingers as its own.
-pub(super) async fn service_of(fingers: &TempDir, name: &str) -> Service {
+pub(crate) async fn service_of(fingers: &TempDir, name: &str) -> Service {
     let folder = fingers.path().join(name);
     let of_finger = |config: &mut Config| {
         config.models = Some(folder);
@@ -72,7 +72,7 @@ pub(super) async fn service_of(fingers: &TempDir, name: &str) -> Service {
 }
 
 /// Fingers for a hello.
-pub(super) fn named(names: &[&str]) -> Value {
+pub(crate) fn named(names: &[&str]) -> Value {
     let fingers = names.iter().map(|name| json!({"name": name}));
     json!({"fingers": fingers.collect::<Vec<Value>>()})
 }

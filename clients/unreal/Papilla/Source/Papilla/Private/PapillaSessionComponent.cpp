@@ -434,7 +434,10 @@ void UPapillaSessionComponent::FetchAtlas()
     const auto Request = FHttpModule::Get().CreateRequest();
     // As long as a request may wait for models that are being loaded.
     Request->SetTimeout(30.0f);
-    Request->SetURL(ToFString(Address.http("/v1/atlas")));
+    // The skin that is drawn is that of the session's first finger. A name needs no escape: one that did
+    // would be refused with the hello.
+    const std::string Name = Hello.Fingers.Num() > 0 ? ToUtf8(Hello.Fingers[0].Name) : std::string();
+    Request->SetURL(ToFString(Address.http(Name.empty() ? "/v1/atlas" : "/v1/atlas?finger=" + Name)));
     for (const TPair<FString, FString>& Header : Headers()) Request->SetHeader(Header.Key, Header.Value);
     TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
     Request->OnProcessRequestComplete().BindLambda([Weak](FHttpRequestPtr, FHttpResponsePtr Response, bool bGood)
