@@ -160,6 +160,8 @@ def test_a_finger_gets_a_network_of_its_own(finger: Path) -> None:
     assert card["pattern_max"]["load_mpa_px"] > 0.0
     index = json.loads((finger / "index.json").read_text())
     assert (index["default"], index["models"]) == ("nano", ["nano"])
+    replay = json.loads((finger / "replay.json").read_text())
+    assert (replay["atlas_hash"], len(replay["presses"])) == (atlas, 1)
     assert not list(finger.rglob("*.partial")) + list(finger.rglob("*.part"))
 
 

@@ -52,12 +52,35 @@ struct Presses {
     fit: f64,
 }
 
+/// What is read of `contact.json`: what a network errs from the poses of its own finger.
+#[derive(Debug, Deserialize)]
+struct FromPoses {
+    network: Option<String>,
+    methods: Vec<Method>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Method {
+    name: String,
+    errors: Vec<MethodError>,
+}
+
+#[derive(Debug, Deserialize)]
+struct MethodError {
+    sed_relative_l2: Option<Spread>,
+}
+
+/// The method by which poses are judged, as `contact.json` calls it.
+const METHOD: &str = "pixels";
+
 /// A network of another finger, which the training begins with.
 #[derive(Debug)]
 pub(super) struct Lender {
     pub name: String,
     pub onnx: PathBuf,
     pub card: Card,
+    /// What it errs from the poses of its own finger; none if its folder does not say.
+    pub from_poses: Option<Spread>,
 }
 
 /// Kind of network that can be trained on.
@@ -74,7 +97,8 @@ impl Lender {
         if card.network.kind != TRAINABLE {
             return Err(TeachError::NotTrainable { card: path, kind: card.network.kind }.into());
         }
-        Ok(Self { name: name.to_owned(), onnx, card })
+        let from_poses = from_poses(folder, name)?;
+        Ok(Self { name: name.to_owned(), onnx, card, from_poses })
     }
 
     /// Whether it learnt from the pressure of contact, and so will the network that it becomes.
@@ -92,6 +116,21 @@ impl Lender {
         let Training { seconds, epochs, presses, .. } = &self.card.training;
         seconds / (epochs * presses.fit).max(1.0)
     }
+}
+
+/// The error of a network from poses, as the folder's `contact.json` has it: its first set is that of
+/// the cards.
+fn from_poses(folder: &Path, name: &str) -> anyhow::Result<Option<Spread>> {
+    let path = folder.join("contact.json");
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let found: FromPoses = atomic::read_json(&path)?;
+    if found.network.as_deref() != Some(name) {
+        return Ok(None);
+    }
+    let method = found.methods.into_iter().find(|method| method.name == METHOD);
+    Ok(method.and_then(|method| method.errors.first()?.sed_relative_l2))
 }
 
 /// What is read of an index.

@@ -24,7 +24,7 @@ pub(super) struct Taught {
     pub before: Errors,
     pub after: Errors,
     /// The network that it began with, on its own finger's held-out presses.
-    pub of_own_finger: Spread,
+    pub of_own_finger: Errors,
 }
 
 /// `teach/report.json`.
@@ -54,29 +54,31 @@ impl Report {
         let or_dash = |s: Option<Spread>| s.map_or_else(|| "-".to_owned(), percent);
         let mut text = format!(
             "\nerror of SED, relative L2 against FE of this finger, %, median / 95th percentile of {} \
-             states of {} held-out presses\n{:10} {:>24} {:>24} {:>24} {:>24}  {:>14}\n",
+             states of {} held-out presses\n{:10} {:>24} {:>14} {:>14}   {:>24} {:>14} {:>14}\n",
             self.held_out_states,
             self.held_out,
             "network",
             "pressure to SED, before",
             "after",
+            "default finger",
             "pose to SED, before",
             "after",
             "default finger"
         );
         for n in &self.networks {
             text += &format!(
-                "{:10} {:>24} {:>24} {:>24} {:>24}  {:>14}\n",
+                "{:10} {:>24} {:>14} {:>14}   {:>24} {:>14} {:>14}\n",
                 n.name,
                 percent(n.before.pressure_to_sed),
                 percent(n.after.pressure_to_sed),
+                percent(n.of_own_finger.pressure_to_sed),
                 or_dash(n.before.pose_to_sed),
                 or_dash(n.after.pose_to_sed),
-                percent(n.of_own_finger)
+                or_dash(n.of_own_finger.pose_to_sed)
             );
         }
-        text += "before: the default finger's network, by similarity alone. default finger: pressure to \
-                 SED of that network on held-out presses of its own finger\n";
+        text += "before: the default finger's network, by similarity alone. default finger: that network \
+                 on held-out presses of its own finger\n";
         let train = self.presses - self.held_out;
         text += &format!(
             "{train} presses were learnt from, in {:.2} core hours of FE",

@@ -107,11 +107,16 @@ pub(super) fn run(
             training_seconds: card.training.seconds,
             before,
             after,
-            of_own_finger: lender.card.metrics.relative_l2,
+            of_own_finger: Errors {
+                pressure_to_sed: lender.card.metrics.relative_l2,
+                pose_to_sed: lender.from_poses,
+            },
         });
     }
     programs.run(index(programs, folder, lenders))?;
     programs.run(programs.model_export(words([&"patterns", folder, &"--dataset", &presses])))?;
+    // Held-out states: the service tries the networks on them, and shows them beside its answers.
+    programs.run(programs.own(words([&"dataset", &"replay", &presses, &"--out", folder])))?;
     Ok(report)
 }
 
