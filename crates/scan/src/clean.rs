@@ -29,10 +29,13 @@ pub struct Cleaned {
 /// farthest along it is the cut end.
 ///
 /// # Errors
-/// [`ScanError::Pieces`], [`ScanError::Hole`].
+/// [`ScanError::Flat`], [`ScanError::Pieces`], [`ScanError::Hole`].
 pub fn clean(scan: &Surface, axis: [f64; 3]) -> Result<Cleaned, ScanError> {
     let mut done = Vec::new();
     let mut surface = joined(scan, &mut done);
+    if surface.triangles.is_empty() {
+        return Err(ScanError::Flat { count: scan.triangles.len() });
+    }
     largest_piece(&mut surface, &mut done)?;
     turned(&mut surface, &mut done);
     let cut = close_holes(&mut surface, axis, &mut done)?;

@@ -3,6 +3,7 @@
 use papilla_fingertip::geometry::fingertip::FingertipShapeError;
 use papilla_fingertip::scene::FingerError;
 use papilla_sdf::files::FileError;
+use std::path::PathBuf;
 
 /// Why no finger was made of a surface. Places are in the file's own frame, mm, unless said
 /// otherwise.
@@ -13,10 +14,13 @@ pub enum ScanError {
     File(#[from] FileError),
     /// Another unit than was said.
     #[error(
-        "the surface is {diagonal:.3} {unit} from corner to corner, which no finger is: it looks like {meant}. \
-         Pass --unit {first}"
+        "{}: the surface is {diagonal:.3} {unit} from corner to corner, which no finger is: it looks like \
+         {meant}. Pass --unit {first}",
+        path.display()
     )]
     Unit {
+        /// The file.
+        path: PathBuf,
         /// Size of the box round it, in the unit that was said.
         diagonal: f64,
         /// The unit that was said.
@@ -28,14 +32,25 @@ pub enum ScanError {
     },
     /// Too large or small in any unit.
     #[error(
-        "the surface is {diagonal:.3} {unit} from corner to corner: neither a finger nor a hand has that size in \
-         any unit"
+        "{}: the surface is {diagonal:.3} {unit} from corner to corner: neither a finger nor a hand has that \
+         size in any unit",
+        path.display()
     )]
     Size {
+        /// The file.
+        path: PathBuf,
         /// Size of the box round it.
         diagonal: f64,
         /// The unit that was said.
         unit: &'static str,
+    },
+    /// Nothing but points and lines.
+    #[error(
+        "all {count} triangles of the surface are without area: export it again, with at least six digits"
+    )]
+    Flat {
+        /// How many.
+        count: usize,
     },
     /// Several bodies.
     #[error(
@@ -90,7 +105,8 @@ pub enum ScanError {
     /// A hand.
     #[error(
         "the surface is {across_mm:.0} mm wide across the axis, near {}: it looks like a whole hand, or a finger \
-         that is bent. Cut out the last phalanx with a mesh editor, or correct --axis",
+         that is bent. Cut out the last phalanx with a mesh editor, or correct --axis. If it is a fingertip, \
+         --unit is not the unit of the file",
         place(at_mm)
     )]
     Hand {
@@ -101,13 +117,19 @@ pub enum ScanError {
     },
     /// Too short to be a fingertip.
     #[error(
-        "only {length_mm:.1} mm of the finger are there behind the tip, {least_mm:.0} mm are the least: scan more of it"
+        "only {length_mm:.1} mm of the finger are there behind the tip, {least_mm:.0} mm are the least: scan more of \
+         it{}",
+        open_mm.as_ref().map_or_else(String::new, |p| format!(
+            ", or close the surface where its open end comes nearest to the tip, at {}", place(p)
+        ))
     )]
     Short {
         /// From the tip to the cut.
         length_mm: f64,
         /// What is needed.
         least_mm: f64,
+        /// Where the open end comes nearest to the tip; none if the surface is closed there.
+        open_mm: Option<[f64; 3]>,
     },
     /// Nail and pad cannot be told apart.
     #[error(

@@ -81,7 +81,8 @@ pub fn fit(scan: &Surface, at: &Where, inside: &Inside<'_>) -> Result<Fitted, Sc
     let along = |p: &[f64; 3]| dot(minus(*p, at.tip_mm), axis);
     let mean = surface.vertices_mm.iter().map(along).sum::<f64>();
     if mean < 0.0 {
-        return Err(ScanError::Axis { axis: at.axis, why: "points out of the finger" });
+        let why = "points out of the finger, or --tip is at the finger's other end";
+        return Err(ScanError::Axis { axis: at.axis, why });
     }
     require_finger(&surface, at.tip_mm, axis)?;
     let near = cropped(&surface, |p| along(p) < BEYOND_MM);
@@ -176,7 +177,7 @@ fn require_finger(surface: &Surface, tip: [f64; 3], axis: [f64; 3]) -> Result<()
     }
     let length_mm = surface.vertices_mm.iter().map(along).fold(0.0, f64::max);
     if length_mm < LENGTH_MIN_MM {
-        return Err(ScanError::Short { length_mm, least_mm: LENGTH_MIN_MM });
+        return Err(ScanError::Short { length_mm, least_mm: LENGTH_MIN_MM, open_mm: None });
     }
     Ok(())
 }
@@ -295,15 +296,15 @@ impl Template {
     fn length(&self, shape: &FingertipShape, placement: &Placement) -> Result<f64, ScanError> {
         let x = |p: &[f64; 3]| dot(placement.rotation[0], *p) + placement.origin_mm[0];
         let far = self.surface.vertices_mm.iter().map(x).fold(f64::NEG_INFINITY, f64::max);
-        let rim = self.rim_mm.iter().map(x).fold(f64::INFINITY, f64::min);
+        let open = self.rim_mm.iter().min_by(|p, q| x(p).total_cmp(&x(q)));
         // A closed end lies across the finger: 1 mm before it the skin is still whole.
-        let there = if self.rim_mm.is_empty() { far - 1.0 } else { rim };
+        let there = open.map_or(far - 1.0, x);
         let usual = FingertipShape::default();
         let wanted = self.wanted_mm.unwrap_or(usual.length_mm / usual.width_mm * shape.width_mm);
         let length = wanted.min(there).min(range("length_mm")[1]);
         if length < LENGTH_MIN_MM.min(wanted) || self.wanted_mm.is_some_and(|w| w > there + 0.5) {
             let least_mm = self.wanted_mm.unwrap_or(LENGTH_MIN_MM);
-            return Err(ScanError::Short { length_mm: there, least_mm });
+            return Err(ScanError::Short { length_mm: there, least_mm, open_mm: open.copied() });
         }
         Ok(length)
     }

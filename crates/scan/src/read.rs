@@ -65,12 +65,12 @@ pub fn surface(path: &Path, unit: Unit) -> Result<Surface, ScanError> {
     let papilla_sdf::Mesh { vertices_mm, triangles } =
         papilla_sdf::files::surface(path, unit.mm())?;
     let surface = Surface { vertices_mm, triangles };
-    believed(&surface, unit)?;
+    believed(&surface, unit, path)?;
     Ok(surface)
 }
 
 /// Refuses a size that no finger has.
-fn believed(surface: &Surface, unit: Unit) -> Result<(), ScanError> {
+fn believed(surface: &Surface, unit: Unit, path: &Path) -> Result<(), ScanError> {
     let mm = surface.diagonal_mm();
     let is_a_size = |mm: f64| (SIZE_MM[0]..=SIZE_MM[1]).contains(&mm);
     if is_a_size(mm) {
@@ -79,7 +79,7 @@ fn believed(surface: &Surface, unit: Unit) -> Result<(), ScanError> {
     let diagonal = mm / unit.mm();
     let meant: Vec<_> = Unit::ALL.into_iter().filter(|u| is_a_size(diagonal * u.mm())).collect();
     let Some(first) = meant.first() else {
-        return Err(ScanError::Size { diagonal, unit: unit.name() });
+        return Err(ScanError::Size { path: path.into(), diagonal, unit: unit.name() });
     };
     let word = |u: &Unit| match u {
         Unit::Millimetre => "millimetres",
@@ -89,6 +89,7 @@ fn believed(surface: &Surface, unit: Unit) -> Result<(), ScanError> {
         Unit::Micrometre => "micrometres",
     };
     Err(ScanError::Unit {
+        path: path.into(),
         diagonal,
         unit: unit.name(),
         meant: meant.iter().map(word).collect::<Vec<_>>().join(" or "),

@@ -93,6 +93,14 @@ fn a_whole_hand_is_no_fingertip() {
 }
 
 #[test]
+fn triangles_without_area_are_no_surface() {
+    let mut lines = finger();
+    lines.triangles.iter_mut().for_each(|t| t[2] = t[1]);
+    let e = fit_of(&lines).err().unwrap();
+    assert!(matches!(e, ScanError::Flat { .. }), "{e}");
+}
+
+#[test]
 fn a_tip_and_an_axis_that_are_elsewhere_are_named() {
     let refused = |at: &Where| fit(&finger(), at, &NOTHING).err().unwrap();
     let e = refused(&Where { tip_mm: moved([-20.0, 0.0, 0.0]), ..where_it_is() });

@@ -71,8 +71,10 @@ pub fn surface(path: &Path, unit_mm: f64) -> Result<Mesh, FileError> {
 }
 
 fn stl(bytes: &[u8]) -> Result<Mesh, String> {
-    let mesh =
-        stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|e| format!("no STL file: {e}"))?;
+    let mesh = stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|e| match e.kind() {
+        std::io::ErrorKind::UnexpectedEof => "no STL file, or one that was cut short".to_owned(),
+        _ => format!("no STL file: {e}"),
+    })?;
     Ok(Mesh {
         vertices_mm: mesh.vertices.iter().map(|v| v.0.map(f64::from)).collect(),
         triangles: mesh.faces.iter().map(|f| f.vertices.map(|v| v as u32)).collect(),
