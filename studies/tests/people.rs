@@ -11,7 +11,7 @@ use std::path::Path;
 
 fn options(only: &[&str]) -> Options {
     let only = only.iter().map(|o| (*o).to_owned()).collect();
-    Options { materials: Materials::NeoHookean, density: Density::Coarse, only }
+    Options { materials: Materials::NeoHookean, finger: None, density: Density::Coarse, only }
 }
 
 fn measured(folder: &Path, figures: &str, force_n: f64) -> Measured {

@@ -57,3 +57,16 @@ fn a_depth_has_no_time_to_be_taken_in() {
         assert!(error.contains(word), "{error}should say {word}");
     }
 }
+
+#[test]
+fn a_record_is_refused_by_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = "press,indenter,radius_mm,pitch_deg,time_s,depth_mm,force_n\n\
+                a,plate,,0,1,0.2,0.1\na,plate,,0,2,400,0.2\na,plate,,0,3,0.6,0.4\n";
+    std::fs::write(folder.path().join("me.csv"), rows).unwrap();
+    let error = refused(run(folder.path(), &["fit", "--record", "me.csv", "--out", "out"]));
+    for word in ["me.csv:3", "depth_mm", "was um meant?"] {
+        assert!(error.contains(word), "{error}should say {word}");
+    }
+    assert!(!folder.path().join("out").exists(), "nothing is written");
+}

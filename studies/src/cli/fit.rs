@@ -1,34 +1,50 @@
-//! `fit`: constants that come closest to people's fingers.
+//! `fit`: the finger that comes closest to people's, or to a person's own records.
 
 use papilla_fe_datagen::cli::{print, refuse_unknown};
 use papilla_progress::Progress;
-use papilla_studies::people::fit::{self, Options, PARTS};
+use papilla_studies::people::fit::{self, Options, PARTS, record};
 use papilla_studies::people::measured::Measured;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Fit the constants of skin and fat, within printed values, to what plates measure on people's
-/// fingers, then the shares of relaxation to the energy lost in a tap.
+/// Fit tissues and shape of the finger, within bounds, to what plates measure on people's fingers or to
+/// a person's own records, and say which constants the measurements tell.
 ///
-/// Writes fit.json, fit.md, materials.toml (tables for a scene) and a file a press; see
-/// studies/reports/fit.md. No chance in it: the same measurements give the same constants. Can be killed
-/// at any moment and started again: what is pressed is not pressed again.
+/// Writes fit.json, fit.md, finger.toml (the finger) and a file a press; see studies/reports/fit.md. No
+/// chance in it: the same measurements give the same constants. Can be killed at any moment and started
+/// again: what is pressed is not pressed again.
 #[derive(clap::Args)]
-#[command(after_help = "Example: papilla-studies fit --out out/fit")]
+#[command(
+    after_help = "A record is a table of comma-separated values with the columns press (a name), indenter \
+                        (plate or ball), radius_mm (of a ball), pitch_deg (of a plate), time_s, depth_mm and \
+                        force_n.\n\
+                        Example: papilla-studies fit --out out/fit\n\
+                        Example: papilla-studies fit --record me.csv --out fingers/me"
+)]
 pub(super) struct Args {
-    /// Only this part (plates, taps, maps; plates are pressed in any case); may be given several times.
+    /// A person's own record, in the place of published figures; may be given several times.
+    #[arg(long, value_name = "FILE")]
+    record: Vec<PathBuf>,
+    /// Only this part beside the constants (constants, halves, taps, rows); may be given several times.
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
-    /// Evaluations at most, two presses each.
-    #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    evaluations: u16,
+    /// Fingers simulated before the first search: the start and points spread over the bounds.
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(12..=1000))]
+    design: u16,
+    /// Fingers simulated after it at most.
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(0..=1000))]
+    rounds: u16,
+    /// Fingers simulated on the graded mesh at most, each ten times as long; 0 leaves the even mesh
+    /// uncorrected.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(0..=100))]
+    graded: u16,
     /// Measurements in the place of those that come with the program.
     #[arg(long, value_name = "FILE")]
     measured: Option<PathBuf>,
-    /// Folder for the report and what a restart needs.
+    /// Folder for the report, the finger and what a restart needs.
     #[arg(long)]
     out: PathBuf,
-    /// Also write the page to this file.
+    /// Also write the page to this file, its plot into pictures/fit beside it.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
     /// Print the fit as JSON.
@@ -42,14 +58,22 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Some(file) => Measured::read(file)?,
         None => Measured::shipped()?,
     };
-    let options = Options { evaluations: args.evaluations.into(), only: args.only.clone() };
-    let progress = Progress::new("evaluations", args.evaluations.into(), 0, args.json);
+    let read = |path: &PathBuf| Ok((path.display().to_string(), record::read(path)?));
+    let records = args.record.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
+    let options = Options {
+        design: args.design.into(),
+        rounds: args.rounds.into(),
+        graded: args.graded.into(),
+        only: args.only.clone(),
+    };
+    let all = options.design + options.rounds + options.graded;
+    let progress = Progress::new("fingers", all, 0, args.json);
     let tell = &mut |what: &str, done: usize, all: usize| {
         progress.set_length(all);
         progress.set_position(done);
         progress.set_message(what);
     };
-    let fit = fit::run(&measured, &options, &args.out, tell)?;
+    let fit = fit::run(&measured, records, &options, &args.out, tell)?;
     drop(progress);
     if let Some(page) = &args.markdown {
         fit.write_page(page)?;

@@ -1,10 +1,11 @@
 //! `human`: the finger beside what was measured on people's.
 
 use papilla_fe_datagen::cli::{CHECKS_FAILED, choices, print, refuse_unknown};
+use papilla_fingertip::scene::{Finger, FingerError};
 use papilla_progress::Progress;
 use papilla_studies::people::measured::Measured;
 use papilla_studies::people::study::{self, Materials, Options, PARTS};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Press the finger as people's were pressed, and compare: stiffness, contact area, pressure,
@@ -16,15 +17,18 @@ use std::process::ExitCode;
 #[command(after_help = "Exit code 3 if a figure lies outside people's spread.\n\
                   Example: papilla-studies human --only sa1 --density coarse --out out/human")]
 pub(super) struct Args {
-    /// Only this part (sa1, plates, tap, relaxation); may be given several times.
+    /// Only this part (sa1, mesh, cylinders, plates, shear, tangential, tap, relaxation); may be given several times.
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
     /// Mesh of the spheres' states, cells split where they touch.
     #[arg(long, value_enum, default_value_t = choices::Density::Medium)]
     density: choices::Density,
-    /// Laws and constants of the tissues.
+    /// Laws and constants of the tissues; with `--finger` the laws that take its constants.
     #[arg(long, value_enum, default_value_t = Materials::NeoHookean)]
     materials: Materials,
+    /// A finger of your own: its folder, its finger.toml, or its name in fingers/.
+    #[arg(long, value_name = "FINGER")]
+    finger: Option<PathBuf>,
     /// Measurements in the place of those that come with the program.
     #[arg(long, value_name = "FILE")]
     measured: Option<PathBuf>,
@@ -45,8 +49,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Some(file) => Measured::read(file)?,
         None => Measured::shipped()?,
     };
+    let named = |path: &PathBuf| {
+        Ok::<_, FingerError>((path.display().to_string(), Finger::find(path, Path::new(""))?))
+    };
+    let finger = args.finger.as_ref().map(named).transpose()?;
     let options = Options {
         materials: args.materials,
+        finger,
         density: args.density.into(),
         only: args.only.clone(),
     };

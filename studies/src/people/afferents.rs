@@ -2,10 +2,10 @@
 
 use crate::people::PeopleError;
 use crate::people::measured::{Profile, Sa1};
-use crate::people::press::{Materials, Press};
+use crate::people::press::{Press, Subject};
 use crate::people::rates::{Law, line_of, r_squared};
 use crate::people::receptors::{DEPTHS_MM, PLACES, SPACING_MM, Stimulus};
-use crate::people::solution::{Solution, State, held_at};
+use crate::people::solution::{Reads, Solution, State, held_at};
 use papilla_fingertip::mesh::fingertip::Density;
 use serde::Serialize;
 use std::path::Path;
@@ -86,16 +86,16 @@ impl Afferents {
     /// Presses every sphere and fits.
     pub(crate) fn new(
         sa1: &Sa1,
-        materials: Materials,
+        subject: &Subject,
         density: Density,
         folder: &Path,
         told: &mut dyn FnMut(&str),
     ) -> Result<Self, PeopleError> {
         let mut presses = Vec::with_capacity(sa1.curvature_per_m.len());
         for &curvature in &sa1.curvature_per_m {
-            let press = Press::sphere(curvature, materials.tissues());
+            let press = Press::sphere(curvature, subject.clone());
             told(&press.name);
-            presses.push(held_at(&press, &sa1.force_n, density, folder)?);
+            presses.push(held_at(&press, &sa1.force_n, density, Reads::Receptors, folder)?);
         }
         let heard = Heard { sa1, presses: &presses };
         let mut fits: Vec<Fit> = Vec::new();

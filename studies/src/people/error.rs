@@ -17,6 +17,16 @@ pub enum PeopleError {
         /// Why.
         why: String,
     },
+    /// A row of a person's own record makes no sense.
+    #[error("{}:{line}: {why}", path.display())]
+    Record {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: u64,
+        /// Why, and what to do.
+        why: String,
+    },
     /// A measurement makes no sense.
     #[error("{field} {rule}; found {found}")]
     Field {

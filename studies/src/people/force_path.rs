@@ -47,6 +47,24 @@ impl ForcePath {
         Some(d1 * (force_n / f1).powf(exponent))
     }
 
+    /// Force at a depth, N: a power law between two states, Hertz' before the first, on beyond the last;
+    /// not a number without a state.
+    #[must_use]
+    pub fn force_at(&self, depth_mm: f64) -> f64 {
+        let last = match self.depth_mm.len().checked_sub(1) {
+            Some(last) if depth_mm > 0.0 => last,
+            Some(_) => return 0.0,
+            None => return f64::NAN,
+        };
+        let above = self.depth_mm.iter().position(|d| *d >= depth_mm).unwrap_or(last);
+        let (d1, f1) = (self.depth_mm[above], self.force_n[above]);
+        let exponent = match above.checked_sub(1) {
+            None => HERTZ,
+            Some(k) => (f1 / self.force_n[k]).ln() / (d1 / self.depth_mm[k]).ln(),
+        };
+        f1 * (depth_mm / d1).powf(exponent)
+    }
+
     /// A value that was read at each state, taken to a force along the line between the two states
     /// next to it; `None` beyond the last by more than `beyond` of the force.
     #[must_use]
@@ -121,6 +139,11 @@ mod tests {
             assert!((0.7 * depth.powf(1.5) - force).abs() < 1e-12, "{force}: {depth}");
         }
         assert_eq!(hertz.depth_at(3.0), None);
+        for depth in [0.05_f64, 0.31, 1.9, 2.2] {
+            let force = hertz.force_at(depth);
+            assert!((force - 0.7 * depth.powf(1.5)).abs() < 1e-12, "{depth}: {force}");
+        }
+        assert!(hertz.force_at(0.0) == 0.0 && ForcePath::default().force_at(1.0).is_nan());
         assert!(hertz.reaches(1.9) && !hertz.reaches(2.0));
         // Linear in force is read exactly, between states and a little beyond them.
         let values: Vec<f64> = hertz.force_n.iter().map(|f| 3.0 + 2.0 * f).collect();

@@ -2,9 +2,9 @@
 
 use crate::people::PeopleError;
 use crate::people::measured::Sa1;
-use crate::people::press::{Materials, Press};
+use crate::people::press::{Press, Subject};
 use crate::people::receptors::{DEPTHS_MM, Stimulus};
-use crate::people::solution::{Solution, held_at};
+use crate::people::solution::{Reads, Solution, held_at};
 use papilla_fingertip::mesh::fingertip::Density;
 use serde::Serialize;
 use std::path::Path;
@@ -28,7 +28,7 @@ pub struct MeshError {
 /// The curved spheres of the profiles on both meshes.
 pub(crate) fn mesh_errors(
     sa1: &Sa1,
-    materials: Materials,
+    subject: &Subject,
     [coarser, finer]: [Density; 2],
     folder: &Path,
     told: &mut dyn FnMut(&str),
@@ -36,10 +36,10 @@ pub(crate) fn mesh_errors(
     let mut errors = Vec::new();
     // A plate costs several times what a sphere does.
     for p in sa1.profiles.iter().filter(|p| p.curvature_per_m > 0.0) {
-        let press = Press::sphere(p.curvature_per_m, materials.tissues());
+        let press = Press::sphere(p.curvature_per_m, subject.clone());
         told(&format!("{} on the finer mesh", press.name));
-        let fine = held_at(&press, &sa1.force_n, finer, folder)?;
-        let coarse = held_at(&press, &sa1.force_n, coarser, folder)?;
+        let fine = held_at(&press, &sa1.force_n, finer, Reads::Receptors, folder)?;
+        let coarse = held_at(&press, &sa1.force_n, coarser, Reads::Receptors, folder)?;
         let middle = |found: &Solution, force_n: f64, s: Stimulus, d: usize| {
             let values: Vec<f64> =
                 found.states.iter().map(|state| state.felt[d][s as usize][0]).collect();

@@ -2,7 +2,7 @@
 
 use crate::people::PeopleError;
 use crate::people::measured::Quantity;
-use crate::people::press::{Cells, Press, Tissues, plate_radius_mm};
+use crate::people::press::{Cells, Press, Subject, plate_radius_mm};
 use crate::people::rates::r_squared;
 use crate::people::solution::{Reads, Solution, State, until};
 use std::path::Path;
@@ -11,35 +11,19 @@ use std::path::Path;
 pub(crate) fn pressed(
     pitch_deg: f64,
     until_n: f64,
-    tissues: Tissues,
+    subject: Subject,
     cells: Cells,
     folder: &Path,
 ) -> Result<Solution, PeopleError> {
-    until(&Press::plate(pitch_deg, tissues), until_n, cells, Reads::Contact, folder)
+    until(&Press::plate(pitch_deg, subject), until_n, cells, Reads::Contact, folder)
 }
 
-/// Plates on the even coarse mesh, side by side; each is an inclination, degrees, and a force, N.
-pub(crate) fn pressed_together(
-    plates: &[(f64, f64)],
-    tissues: &Tissues,
-    folder: &Path,
-) -> Result<Vec<(f64, Solution)>, PeopleError> {
-    let press = |(pitch_deg, until_n): (f64, f64)| {
-        let found = pressed(pitch_deg, until_n, tissues.clone(), Cells::COARSE, folder)?;
-        Ok((pitch_deg, found))
-    };
-    std::thread::scope(|scope| {
-        let threads: Vec<_> =
-            plates.iter().map(|&plate| scope.spawn(move || press(plate))).collect();
-        let join = |t: std::thread::ScopedJoinHandle<'_, Result<_, PeopleError>>| {
-            t.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        threads.into_iter().map(join).collect()
-    })
-}
-
-/// A figure of the finger, or why there is none.
-pub(crate) fn figure(quantity: &Quantity, press: &Solution) -> Result<f64, PeopleError> {
+/// A figure of a finger, or why there is none.
+pub(crate) fn figure(
+    quantity: &Quantity,
+    subject: &Subject,
+    press: &Solution,
+) -> Result<f64, PeopleError> {
     let Some((pitch_deg, most_n)) = quantity.plate() else { return Ok(f64::NAN) };
     let path = &press.path;
     if !path.reaches(most_n) {
@@ -68,14 +52,14 @@ pub(crate) fn figure(quantity: &Quantity, press: &Solution) -> Result<f64, Peopl
             at(force_n, &of(|s| s.contact.map_or(f64::NAN, |c| c.peak_over_mean)))
         }
         Quantity::HertzModulus { force_n, pitch_deg } => {
-            let radius_mm = plate_radius_mm(pitch_deg)?;
+            let radius_mm = plate_radius_mm(pitch_deg, subject)?;
             let depth_mm = path.depth_at(force_n).unwrap_or(f64::NAN);
             hertz_modulus_mpa(force_n, depth_mm, radius_mm)
         }
         Quantity::VolumeLost { .. } => {
             -of(|s| s.volume_change_percent).into_iter().fold(0.0, f64::min)
         }
-        Quantity::RelaxationTime { .. } | Quantity::EnergyLost { .. } => f64::NAN,
+        _ => f64::NAN,
     })
 }
 
@@ -101,6 +85,7 @@ mod tests {
     use super::*;
     use crate::people::contact::ContactRead;
     use crate::people::force_path::steps_mm;
+    use crate::people::press::Materials;
 
     /// A sphere of 10 mm and 0.1 MPa as Hertz has it: area `pi R d`, pressure an ellipsoid.
     fn hertz() -> Solution {
@@ -123,7 +108,8 @@ mod tests {
     fn figures_of_a_hertzian_finger_are_those_of_hertz() {
         let press = hertz();
         let pitch_deg = 0.0;
-        let figure = |q| figure(&q, &press).unwrap();
+        let subject = Materials::NeoHookean.subject();
+        let figure = |q| figure(&q, &subject, &press).unwrap();
         // Area goes as F^(2/3), stiffness as F^(1/3).
         let ratio = figure(Quantity::AreaRatio { from_n: 0.2, to_n: 2.0, pitch_deg });
         assert!((ratio - 0.1f64.powf(2.0 / 3.0)).abs() < 2e-3, "{ratio}");
@@ -140,7 +126,8 @@ mod tests {
     #[test]
     fn a_force_that_is_not_reached_is_an_error_with_what_is() {
         let wanted = Quantity::Stiffness { force_n: 10.0, pitch_deg: 0.0 };
-        let error = figure(&wanted, &hertz()).unwrap_err().to_string();
+        let subject = Materials::NeoHookean.subject();
+        let error = figure(&wanted, &subject, &hertz()).unwrap_err().to_string();
         assert!(error.contains("10 N is not reached") && error.contains("3.00 mm"), "{error}");
     }
 
@@ -149,5 +136,18 @@ mod tests {
         let x = [1.0, 2.0, 4.0];
         assert!((straightness(&x, &x.map(|v| 3.0 - v)) - 1.0).abs() < 1e-12);
         assert!(straightness(&x, &[1.0, 9.0, 1.0]) < 0.2);
+    }
+
+    /// The set `people` presses an inclined plate as it did when it was fitted.
+    #[test]
+    #[ignore = "long"]
+    fn the_set_people_is_as_stiff_as_it_was_fitted() {
+        const HERTZ_MPA: f64 = 0.0651;
+        let folder = tempfile::tempdir().unwrap();
+        let subject = Materials::People.subject();
+        let press = pressed(30.0, 0.5, subject.clone(), Cells::COARSE, folder.path()).unwrap();
+        let hertz = Quantity::HertzModulus { force_n: 0.5, pitch_deg: 30.0 };
+        let found = figure(&hertz, &subject, &press).unwrap();
+        assert!((found / HERTZ_MPA - 1.0).abs() < 0.02, "{found}");
     }
 }

@@ -8,8 +8,9 @@ use papilla_fingertip::mesh::grading::Contact;
 use papilla_fingertip::scene::{
     EffectName, Geometry, MaterialSet, Motion, Pose, Scene, TissueTable,
 };
+use papilla_fingertip::simulation::body::rotation;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
-use papilla_sdf::{IndenterSpec, Plate, Sphere};
+use papilla_sdf::{Cylinder, IndenterSpec, Plate, Sphere};
 use serde::{Deserialize, Serialize};
 
 /// Laws and constants of the tissues.
@@ -35,23 +36,36 @@ impl Materials {
         }
     }
 
-    pub(crate) fn tissues(self) -> Tissues {
+    /// The law of its soft tissues.
+    #[must_use]
+    pub const fn law(self) -> &'static str {
+        match self {
+            Self::NeoHookean => "neo-Hookean",
+            Self::Ogden | Self::People => "Ogden's",
+        }
+    }
+
+    /// The default finger with them.
+    pub(crate) fn subject(self) -> Subject {
         let set = match self {
             Self::NeoHookean | Self::Ogden => MaterialSet::Papers,
             Self::People => MaterialSet::People,
         };
-        Tissues { table: set.table(), hyperelastic: self != Self::NeoHookean }
+        let shape = FingertipShape::default();
+        Subject { shape, table: set.table(), hyperelastic: self != Self::NeoHookean }
     }
 }
 
-/// Constants of the tissues, and whether the laws of their tables `ogden` are used.
+/// The finger that is pressed: its shape, the constants of its tissues, and whether the laws of their
+/// tables `ogden` are used.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Tissues {
+pub(crate) struct Subject {
+    pub shape: FingertipShape,
     pub table: TissueTable,
     pub hyperelastic: bool,
 }
 
-impl Tissues {
+impl Subject {
     pub(crate) fn effects(&self) -> Vec<EffectName> {
         let mut effects = papilla_fingertip::scene::effects::usual();
         if self.hyperelastic {
@@ -77,8 +91,13 @@ pub(crate) struct Press {
     pub name: String,
     pub indenter: IndenterSpec,
     pub pitch_deg: f64,
-    pub tissues: Tissues,
+    /// Turn about the indenter's own axis, degrees.
+    pub yaw_deg: f64,
+    pub subject: Subject,
 }
+
+/// Length of a cylinder, mm: it is longer than any finger is wide.
+const CYLINDER_MM: f64 = 40.0;
 
 /// The mesh that a press is solved on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -99,40 +118,59 @@ impl Cells {
 
 impl Press {
     /// A plate that is inclined tip first.
-    pub(crate) fn plate(pitch_deg: f64, tissues: Tissues) -> Self {
+    pub(crate) fn plate(pitch_deg: f64, subject: Subject) -> Self {
         let indenter = IndenterSpec::Plate(Plate { size_mm: [30.0, 30.0], ..Plate::default() });
-        Self { name: format!("plate-{pitch_deg}"), indenter, pitch_deg, tissues }
+        let name = format!("plate-{pitch_deg}");
+        Self { name, indenter, pitch_deg, yaw_deg: 0.0, subject }
     }
 
     /// A sphere of a curvature in 1/m; 0 is a plate.
-    pub(crate) fn sphere(curvature_per_m: f64, tissues: Tissues) -> Self {
+    pub(crate) fn sphere(curvature_per_m: f64, subject: Subject) -> Self {
         if curvature_per_m == 0.0 {
-            return Self { name: "sphere-0".into(), ..Self::plate(0.0, tissues) };
+            return Self { name: "sphere-0".into(), ..Self::plate(0.0, subject) };
         }
         let indenter = IndenterSpec::Sphere(Sphere { radius_mm: 1e3 / curvature_per_m });
-        Self { name: format!("sphere-{curvature_per_m}"), indenter, pitch_deg: 0.0, tissues }
+        let name = format!("sphere-{curvature_per_m}");
+        Self { name, indenter, ..Self::plate(0.0, subject) }
     }
 
-    /// The scene that presses the default finger, up to a depth.
+    /// A cylinder that lies across the finger, turned about the normal of the pad.
+    pub(crate) fn cylinder(curvature_per_m: f64, turn_deg: f64, subject: Subject) -> Self {
+        let indenter = IndenterSpec::Cylinder(Cylinder {
+            radius_mm: 1e3 / curvature_per_m,
+            length_mm: CYLINDER_MM,
+            ..Cylinder::default()
+        });
+        let name = format!("cylinder-{curvature_per_m}-{turn_deg}");
+        Self { name, indenter, yaw_deg: turn_deg, ..Self::plate(0.0, subject) }
+    }
+
+    /// The scene that presses the finger, up to a depth.
     pub(crate) fn scene(&self, cells: Cells, depth_mm: f64) -> Scene {
         let Cells { density, order } = cells;
         Scene {
             geometry: Geometry::Fingertip {
                 density,
                 order,
-                shape: FingertipShape::default(),
+                shape: self.subject.shape.clone(),
                 finger: None,
             },
-            materials: self.tissues.elastic(),
+            materials: self.subject.elastic(),
             indenter: self.indenter.clone(),
             motion: Motion::to_depth(depth_mm, 1, self.pose()),
-            effects: self.tissues.effects(),
+            effects: self.subject.effects(),
             ..Scene::usual()
         }
     }
 
+    /// 1 if a positive turn carries the indenter's own y axis towards -x, else -1.
+    pub(crate) fn turned_side(&self) -> f64 {
+        let pose = Pose { yaw_deg: 1.0, ..Pose::default() };
+        -rotation(pose)[0][1].signum()
+    }
+
     fn pose(&self) -> Pose {
-        Pose { pitch_deg: self.pitch_deg, ..Pose::default() }
+        Pose { pitch_deg: self.pitch_deg, yaw_deg: self.yaw_deg, ..Pose::default() }
     }
 
     /// The indenter in its pose.
@@ -148,14 +186,14 @@ impl Press {
             source: IndenterError::NeverTouches,
         };
         let drive = Drive::Depths(depths_mm.to_vec());
-        self.approach()?.contact_with(&FingertipShape::default(), &drive).ok_or_else(never)
+        self.approach()?.contact_with(&self.subject.shape, &drive).ok_or_else(never)
     }
 
     /// Radius of the sphere that Hertz' law would put in the place of the finger where it is first
     /// touched, mm: the geometric mean of its principal radii of curvature.
     pub(crate) fn finger_radius_mm(&self) -> Result<f64, PeopleError> {
         let contact = self.first_touch(&[1.0])?;
-        Ok(radius_mm(&FingertipShape::default(), contact.first))
+        Ok(radius_mm(&self.subject.shape, contact.first))
     }
 }
 
@@ -168,15 +206,17 @@ impl Press {
         let finger = 1.0 / self.finger_radius_mm()?;
         let curvature = match &self.indenter {
             IndenterSpec::Sphere(ball) => finger + 1.0 / ball.radius_mm,
+            // Curved one way only.
+            IndenterSpec::Cylinder(rod) => finger + 0.5 / rod.radius_mm,
             _ => finger,
         };
         Ok((0.75 * 0.75 * force_n * curvature.sqrt() / SOFT_MPA).powf(2.0 / 3.0))
     }
 }
 
-/// Radius of the finger where a plate first touches it, mm; see [`Press::finger_radius_mm`].
-pub(crate) fn plate_radius_mm(pitch_deg: f64) -> Result<f64, PeopleError> {
-    Press::plate(pitch_deg, Materials::NeoHookean.tissues()).finger_radius_mm()
+/// Radius of a finger where a plate first touches it, mm; see [`Press::finger_radius_mm`].
+pub(crate) fn plate_radius_mm(pitch_deg: f64, subject: &Subject) -> Result<f64, PeopleError> {
+    Press::plate(pitch_deg, subject.clone()).finger_radius_mm()
 }
 
 /// Distance over which normals are compared, mm.
@@ -235,9 +275,9 @@ mod tests {
 
     #[test]
     fn a_sphere_of_curvature_0_is_flat_and_one_of_694_small() {
-        let flat = Press::sphere(0.0, Materials::NeoHookean.tissues());
+        let flat = Press::sphere(0.0, Materials::NeoHookean.subject());
         assert_eq!(flat.indenter.name(), "plate");
-        let IndenterSpec::Sphere(ball) = Press::sphere(694.0, Materials::Ogden.tissues()).indenter
+        let IndenterSpec::Sphere(ball) = Press::sphere(694.0, Materials::Ogden.subject()).indenter
         else {
             panic!("no sphere")
         };

@@ -81,7 +81,13 @@ impl Stimulus {
     }
 }
 
-/// Values of every stimulus along the line from the middle: `[depth][stimulus][place]`.
+/// Radius of the disc that a population fills, mm: an afferent farther from the middle is silent in the
+/// measured profiles.
+const POPULATION_MM: f64 = 4.0;
+/// Distance of a population's receptors, mm.
+const POPULATION_SPACING_MM: f64 = 0.5;
+
+/// Values of every stimulus at each place: `[depth][stimulus][place]`.
 pub type Felt = Vec<Vec<Vec<f64>>>;
 
 /// Receptors of a finger around the first touch of an indenter.
@@ -90,37 +96,67 @@ pub(crate) struct Receptors<'a> {
     interface: SurfaceReader,
     /// Points in the order depth, place, direction.
     probe: Probe,
+    /// Points whose mean is felt at a place.
+    directions: usize,
 }
 
 /// Along the finger and across it, both ways.
 const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
 
+/// Places of a population, mm along the finger and across it from the middle.
+pub(crate) fn population_mm() -> Vec<[f64; 2]> {
+    let half = (POPULATION_MM / POPULATION_SPACING_MM).round() as i32;
+    let at = |i: i32| POPULATION_SPACING_MM * f64::from(i);
+    let square = (-half..=half).flat_map(|i| (-half..=half).map(move |j| [at(i), at(j)]));
+    square.filter(|[x, y]| x.hypot(*y) <= POPULATION_MM).collect()
+}
+
 impl<'a> Receptors<'a> {
-    /// Receptors around `first` (mm), on the skin under an indenter that comes along +z.
-    pub(crate) fn new(
+    /// Receptors at [`PLACES`] distances from `first` (mm), on the skin under an indenter that comes
+    /// along +z; what is felt at one is the mean of [`DIRECTIONS`].
+    pub(crate) fn lines(
         press: &str,
         finger: &FingertipShape,
         body: &'a Body,
         first: [f64; 3],
     ) -> Result<Self, PeopleError> {
+        let place = |k: usize| DIRECTIONS.map(|d| d.map(|v| v * SPACING_MM * k as f64));
+        let offsets: Vec<[f64; 2]> = (0..PLACES).flat_map(place).collect();
+        Self::new(press, finger, body, first, (&offsets, DIRECTIONS.len()))
+    }
+
+    /// Receptors at [`population_mm`] around `first`.
+    pub(crate) fn grid(
+        press: &str,
+        finger: &FingertipShape,
+        body: &'a Body,
+        first: [f64; 3],
+    ) -> Result<Self, PeopleError> {
+        Self::new(press, finger, body, first, (&population_mm(), 1))
+    }
+
+    fn new(
+        press: &str,
+        finger: &FingertipShape,
+        body: &'a Body,
+        first: [f64; 3],
+        (offsets, directions): (&[[f64; 2]], usize),
+    ) -> Result<Self, PeopleError> {
         let bad = |why: String| PeopleError::Receptor { press: press.into(), why };
         let (mut interface, mut points) = (Vec::new(), Vec::new());
         for depth_mm in DEPTHS_MM {
-            for place in 0..PLACES {
-                let away = SPACING_MM * place as f64;
-                for [a, b] in DIRECTIONS {
-                    let p = [first[0] + a * away, first[1] + b * away, first[2]];
-                    let parameter = finger.parameter_of(p);
-                    let skin = finger.skin(parameter);
-                    let normal = finger.skin_normal(skin);
-                    let below = |d: f64| std::array::from_fn(|i| skin[i] - d * normal[i]);
-                    if depth_mm > finger.epidermis_mm {
-                        points.push(below(depth_mm));
-                    } else {
-                        let layers = finger.layers(parameter).map_err(|e| bad(e.to_string()))?;
-                        interface.push(layers[1]);
-                        points.push(below(depth_mm + BELOW_INTERFACE_MM));
-                    }
+            for [along, across] in offsets {
+                let p = [first[0] + along, first[1] + across, first[2]];
+                let parameter = finger.parameter_of(p);
+                let skin = finger.skin(parameter);
+                let normal = finger.skin_normal(skin);
+                let below = |d: f64| std::array::from_fn(|i| skin[i] - d * normal[i]);
+                if depth_mm > finger.epidermis_mm {
+                    points.push(below(depth_mm));
+                } else {
+                    let layers = finger.layers(parameter).map_err(|e| bad(e.to_string()))?;
+                    interface.push(layers[1]);
+                    points.push(below(depth_mm + BELOW_INTERFACE_MM));
                 }
             }
         }
@@ -129,6 +165,7 @@ impl<'a> Receptors<'a> {
             body,
             interface: SurfaceReader::new(mesh, &mesh.surfaces["interface"], &interface),
             probe: Probe::new(mesh, &points).map_err(|e| bad(e.to_string()))?,
+            directions,
         })
     }
 
@@ -155,12 +192,13 @@ impl<'a> Receptors<'a> {
             value[0] = sed;
             value[1] = sed.max(0.0).sqrt();
         }
+        let count = values.len() / (DEPTHS_MM.len() * self.directions);
         let mean = |depth: usize, stimulus: usize, place: usize| {
-            let from = DIRECTIONS.len() * (depth * PLACES + place);
-            let around = &values[from..from + DIRECTIONS.len()];
-            around.iter().map(|v| v[stimulus]).sum::<f64>() / DIRECTIONS.len() as f64
+            let from = self.directions * (depth * count + place);
+            let around = &values[from..from + self.directions];
+            around.iter().map(|v| v[stimulus]).sum::<f64>() / self.directions as f64
         };
-        let line = |d, s| (0..PLACES).map(|p| mean(d, s, p)).collect();
+        let line = |d, s| (0..count).map(|p| mean(d, s, p)).collect();
         let depth = |d| (0..Stimulus::ALL.len()).map(|s| line(d, s)).collect();
         Ok((0..DEPTHS_MM.len()).map(depth).collect())
     }

@@ -3,9 +3,11 @@
 use crate::people::PeopleError;
 use crate::people::contact::{self, ContactRead};
 use crate::people::force_path::{ForcePath, steps_mm};
+use crate::people::gradients::Gradients;
 use crate::people::press::{Cells, Press};
 use crate::people::receptors::{Felt, Receptors};
 use papilla_dataset::BALANCE_RELATIVE_MAX;
+use papilla_fem::element::Inverted;
 use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::mesh::fingertip::{Density, Order};
@@ -61,7 +63,44 @@ pub(crate) struct Solution {
 pub(crate) enum Reads {
     Force,
     Contact,
+    /// Receptors on lines from the middle.
     Receptors,
+    /// Receptors all over the skin around the middle.
+    Population,
+    /// Displacement gradients of the epidermis.
+    Gradients,
+}
+
+/// What reads a state.
+enum Reader<'a> {
+    None,
+    Receptors(Receptors<'a>),
+    Gradients(Gradients<'a>),
+}
+
+impl<'a> Reader<'a> {
+    fn new(
+        reads: Reads,
+        press: &str,
+        finger: &FingertipShape,
+        body: &'a Body,
+        first: [f64; 3],
+    ) -> Result<Self, PeopleError> {
+        Ok(match reads {
+            Reads::Receptors => Self::Receptors(Receptors::lines(press, finger, body, first)?),
+            Reads::Population => Self::Receptors(Receptors::grid(press, finger, body, first)?),
+            Reads::Gradients => Self::Gradients(Gradients::new(press, finger, body, first)?),
+            Reads::Force | Reads::Contact => Self::None,
+        })
+    }
+
+    fn felt(&self, solver: &Solver<'_>, record: &IncrementRecord) -> Result<Felt, Inverted> {
+        match self {
+            Self::None => Ok(Felt::new()),
+            Self::Receptors(r) => r.felt(solver, record),
+            Self::Gradients(g) => Ok(g.read(solver)),
+        }
+    }
 }
 
 /// How far a press goes.
@@ -112,15 +151,12 @@ impl Solution {
         let failed =
             |e: SimulationError| PeopleError::Press { press: press.name.clone(), source: e.into() };
         let begun_s = processor::thread_s();
-        let finger = FingertipShape::default();
+        let finger = &press.subject.shape;
         let touch = press.first_touch(&course.depths_mm)?;
-        let mut body = body(scene, &finger, course.cells, &touch).map_err(failed)?;
+        let mut body = body(scene, finger, course.cells, &touch).map_err(failed)?;
         body.read_at_nodes();
         self.unknowns = body.problem.system.dofs.count;
-        let receptors = match course.reads {
-            Reads::Receptors => Some(Receptors::new(&press.name, &finger, &body, touch.first)?),
-            Reads::Force | Reads::Contact => None,
-        };
+        let reader = Reader::new(course.reads, &press.name, finger, &body, touch.first)?;
         let rest_mm3 = body.problem.volume_mm3(&vec![[0.0; 3]; body.problem.mesh.nodes.len()]);
         let rotation = touch.start.rotation;
         let force = Cell::new(0.0);
@@ -132,17 +168,16 @@ impl Solution {
             }
             force.set(solver.force_along_path_n());
             path.push(record.depth_mm, force.get());
-            let felt = receptors.as_ref().map(|r| r.felt(solver, record)).transpose();
-            let felt = felt.unwrap_or_else(|e| {
+            let felt = reader.felt(solver, record).unwrap_or_else(|e| {
                 broken = Some(e.to_string());
-                None
+                Felt::new()
             });
             let touches = course.reads == Reads::Contact;
             let volume_mm3 = body.problem.volume_mm3(solver.displacement_mm());
             State {
                 contact: if touches { contact::read(&body, solver, rotation) } else { None },
                 volume_change_percent: 100.0 * (volume_mm3 / rest_mm3 - 1.0),
-                felt: felt.unwrap_or_default(),
+                felt,
                 energy_vs_work: record.checks.energy_vs_work,
             }
         };
@@ -225,6 +260,7 @@ pub(crate) fn held_at(
     press: &Press,
     forces_n: &[f64],
     density: Density,
+    reads: Reads,
     folder: &Path,
 ) -> Result<Solution, PeopleError> {
     let most_n = forces_n.last().copied().unwrap_or(0.0);
@@ -244,7 +280,7 @@ pub(crate) fn held_at(
     };
     let depths_mm = forces_n.iter().map(depth).collect::<Result<_, _>>()?;
     let cells = Cells::graded(density);
-    let course = Course { cells, depths_mm, until_n: f64::INFINITY, reads: Reads::Receptors };
+    let course = Course { cells, depths_mm, until_n: f64::INFINITY, reads };
     let held = Solution::found_or_solved(press, &course, folder)?;
     if held.states.len() == forces_n.len() && held.ended.is_none() {
         return Ok(held);

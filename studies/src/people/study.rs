@@ -6,27 +6,45 @@ use crate::people::measured::{Figure, Measured, Quantity};
 use crate::people::mesh_error::mesh_errors;
 use crate::people::pad;
 pub use crate::people::press::Materials;
-use crate::people::press::{Cells, Tissues};
+use crate::people::press::{Cells, Subject};
 use crate::people::report::{Plate, Report, Row};
 use crate::people::solution::Solution;
+use crate::people::tangential::Tangential;
 use crate::people::tap::{self, Tap};
+use crate::people::{profile_turn, shear};
 use papilla_fingertip::mesh::fingertip::Density;
-use papilla_fingertip::scene::TissueTable;
+use papilla_fingertip::scene::{Finger, TissueTable};
 use papilla_output::atomic;
 use std::path::Path;
 
 /// Parts of the comparison, as the command line names them.
-pub const PARTS: [&str; 5] = ["sa1", "mesh", "plates", "tap", "relaxation"];
+pub const PARTS: [&str; 8] =
+    ["sa1", "mesh", "cylinders", "plates", "shear", "tangential", "tap", "relaxation"];
 
 /// What is compared, and on what.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Laws and constants of the tissues.
     pub materials: Materials,
+    /// The finger, with its own constants, by its name; the default one if not given.
+    pub finger: Option<(String, Finger)>,
     /// Mesh of the spheres' states; plates press the coarse one.
     pub density: Density,
     /// Some of [`PARTS`]; empty is all.
     pub only: Vec<String>,
+}
+
+impl Options {
+    /// The finger that is pressed. Of a finger's own constants `materials` says which laws take them.
+    fn subject(&self) -> Subject {
+        let usual = self.materials.subject();
+        match &self.finger {
+            Some((_, own)) => {
+                Subject { shape: own.shape.clone(), table: own.tissue.clone(), ..usual }
+            }
+            None => usual,
+        }
+    }
 }
 
 /// Compares the finger with `measured`. Writes `human.json`, `human.md` and plots into `folder`, and a
@@ -48,18 +66,18 @@ pub fn run(
     let spheres = if wanted("sa1") { measured.sa1.curvature_per_m.len() } else { 0 };
     let all = plates.len() + spheres;
     let mut done = 0;
-    let mut report = Report::new(options.materials, options.density);
+    let subject = options.subject();
+    let mut report = Report::new(
+        options.materials,
+        options.finger.as_ref().map(|f| f.0.clone()),
+        options.density,
+    );
     if wanted("sa1") {
-        let found = Afferents::new(
-            &measured.sa1,
-            options.materials,
-            options.density,
-            folder,
-            &mut |press| {
+        let found =
+            Afferents::new(&measured.sa1, &subject, options.density, folder, &mut |press| {
                 told(press, done, all);
                 done += 1;
-            },
-        )?;
+            })?;
         report.take_afferents(found, measured);
     }
     if wanted("mesh")
@@ -67,20 +85,20 @@ pub fn run(
     {
         let pair = [options.density, finer];
         let told = &mut |press: &str| told(press, done, all);
-        report.mesh_errors = mesh_errors(&measured.sa1, options.materials, pair, folder, told)?;
+        report.mesh_errors = mesh_errors(&measured.sa1, &subject, pair, folder, told)?;
     }
     let mut pressed = Vec::new();
-    let (tissues, coarse) = (options.materials.tissues(), Cells::graded(Density::Coarse));
+    let coarse = Cells::graded(Density::Coarse);
     for &(pitch_deg, until_n) in &plates {
         told(&format!("plate at {pitch_deg} degrees"), done, all);
-        pressed
-            .push((pitch_deg, pad::pressed(pitch_deg, until_n, tissues.clone(), coarse, folder)?));
+        let found = pad::pressed(pitch_deg, until_n, subject.clone(), coarse, folder)?;
+        pressed.push((pitch_deg, found));
         done += 1;
     }
     for figure in &measured.figures {
         if wanted(part(&figure.quantity)) {
             told(part(&figure.quantity), done, all);
-            report.rows.push(row(figure, &pressed, &tissues, folder)?);
+            report.rows.push(row(figure, &pressed, &subject, folder)?);
         }
     }
     report.plates = pressed.into_iter().map(|(pitch_deg, s)| Plate::new(pitch_deg, s)).collect();
@@ -103,6 +121,9 @@ fn part(quantity: &Quantity) -> &'static str {
     match quantity {
         Quantity::RelaxationTime { .. } => "relaxation",
         Quantity::EnergyLost { .. } => "tap",
+        Quantity::EnergyOutside { .. } => "tangential",
+        Quantity::ProfileTurn { .. } => "cylinders",
+        Quantity::ShearRatio { .. } => "shear",
         _ => "plates",
     }
 }
@@ -123,21 +144,30 @@ pub(crate) fn plates(measured: &Measured) -> Vec<(f64, f64)> {
 pub(crate) fn row(
     figure: &Figure,
     plates: &[(f64, Solution)],
-    tissues: &Tissues,
+    subject: &Subject,
     folder: &Path,
 ) -> Result<Row, PeopleError> {
     let here = match figure.quantity {
         Quantity::RelaxationTime { .. } => {
-            Ok(nearest(figure.value.unwrap_or(f64::NAN), &tissues.table))
+            Ok(nearest(figure.value.unwrap_or(f64::NAN), &subject.table))
         }
         Quantity::EnergyLost { depth_mm, time_s } => {
-            let tap = Tap::found_or_solved(tissues, true, depth_mm, time_s, folder)?;
+            let tap = Tap::found_or_solved(subject, true, depth_mm, time_s, folder)?;
             Ok(tap.lost_percent)
         }
+        Quantity::EnergyOutside { force_n, shift_mm, friction } => {
+            let asked = (force_n, shift_mm, friction);
+            Ok(Tangential::found_or_solved(subject, asked, folder)?.share_outside)
+        }
+        Quantity::ProfileTurn { curvature_per_m, turn_deg, force_n } => {
+            let asked = (curvature_per_m, turn_deg, force_n);
+            Ok(profile_turn::under_cylinder(subject, asked, folder)?.turn_deg)
+        }
+        Quantity::ShearRatio { from_n, to_n } => Ok(shear::ratio(subject, [from_n, to_n], folder)?),
         _ => {
             let pitch = figure.quantity.plate().map(|p| p.0);
             let press = plates.iter().find(|(at, _)| Some(*at) == pitch);
-            match press.map(|(_, press)| pad::figure(&figure.quantity, press)) {
+            match press.map(|(_, press)| pad::figure(&figure.quantity, subject, press)) {
                 Some(Ok(here)) => Ok(here),
                 Some(Err(why @ PeopleError::Force { .. })) => Err(why.to_string()),
                 Some(Err(other)) => return Err(other),

@@ -1,9 +1,10 @@
 //! A tap: down and up again, with tissues that relax.
 
 use crate::people::PeopleError;
-use crate::people::press::Tissues;
+use crate::people::press::Subject;
 use papilla_fem::solve::Options;
-use papilla_fingertip::scene::{EffectName, PathPoint, Scene, TissueTable};
+use papilla_fingertip::mesh::fingertip::{Density, Order};
+use papilla_fingertip::scene::{EffectName, Geometry, PathPoint, Scene, TissueTable};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_progress::processor;
@@ -29,15 +30,15 @@ pub(crate) struct Tap {
 
 impl Tap {
     /// From `folder`, or solved and written there: with a plate, `time_s` down to `depth_mm` and
-    /// `time_s` up, on the even coarse mesh; the tissues relax if they are told to.
+    /// `time_s` up, on the even coarse mesh; the tissues relax if `relaxes`.
     pub(crate) fn found_or_solved(
-        tissues: &Tissues,
+        subject: &Subject,
         relaxes: bool,
         depth_mm: f64,
         time_s: f64,
         folder: &Path,
     ) -> Result<Self, PeopleError> {
-        let scene = scene(tissues, relaxes, depth_mm, time_s);
+        let scene = scene(subject, relaxes, depth_mm, time_s);
         let fingerprint = part::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
         let path = folder.join(format!("tap-{}.json", &fingerprint[..8]));
         let found: Option<Self> = part::read_json(&path)?;
@@ -52,9 +53,15 @@ impl Tap {
     }
 }
 
-fn scene(tissues: &Tissues, relaxes: bool, depth_mm: f64, time_s: f64) -> Scene {
-    let mut scene =
-        Scene { effects: tissues.effects(), materials: tissues.table.clone(), ..Scene::usual() };
+fn scene(subject: &Subject, relaxes: bool, depth_mm: f64, time_s: f64) -> Scene {
+    let geometry = Geometry::Fingertip {
+        density: Density::Coarse,
+        order: Order::Linear,
+        shape: subject.shape.clone(),
+        finger: None,
+    };
+    let (effects, materials) = (subject.effects(), subject.table.clone());
+    let mut scene = Scene { geometry, effects, materials, ..Scene::usual() };
     if relaxes {
         scene.effects.extend(EffectName::named("viscoelastic"));
     }
@@ -100,8 +107,8 @@ mod tests {
     fn what_does_not_relax_gives_its_work_back() {
         let folder = tempfile::tempdir().unwrap();
         let tap = |relaxes, time_s| {
-            let tissues = Materials::NeoHookean.tissues();
-            Tap::found_or_solved(&tissues, relaxes, 1.0, time_s, folder.path()).unwrap()
+            let subject = Materials::NeoHookean.subject();
+            Tap::found_or_solved(&subject, relaxes, 1.0, time_s, folder.path()).unwrap()
         };
         let taps = [tap(false, 0.05), tap(true, 0.2)];
         let [elastic, relaxing] = [0, 1].map(|i: usize| taps[i].lost_percent);

@@ -201,7 +201,7 @@ fn step(at: &[f64], here: &[f64], jacobian: &[Vec<f64>], damping: f64) -> Vec<f6
 }
 
 /// Cholesky's factorization, in place, of a matrix that is positive definite.
-pub(super) fn solved(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
+fn solved(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
     let n = b.len();
     for k in 0..n {
         for i in k..n {

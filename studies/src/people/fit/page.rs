@@ -1,95 +1,138 @@
-//! The page of a fit, and its tables for scenes.
+//! The page of a fit.
 
-use super::{Fit, Identified};
+use super::judged::near;
+use super::{Fit, Fitted, Identified};
 use crate::people::PeopleError;
-use papilla_fingertip::scene::TissueTable;
 use papilla_output::{OutputError, atomic};
-use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// What the page says before its tables.
 const HEAD: &str = include_str!("head.md");
-
-/// What `materials.toml` holds.
-#[derive(Serialize)]
-struct Tables<'a> {
-    materials: &'a TissueTable,
-}
+/// What it says after them.
+const TAIL: &str = include_str!("tail.md");
+/// Folder of the plots, beside the page.
+const PICTURES: &str = "pictures/fit";
 
 impl Fit {
-    /// Writes `fit.json`, `fit.md` and `materials.toml`.
+    /// Writes `fit.json`, `fit.md` with its plot, and `finger.toml`.
     pub(super) fn write(&self, folder: &Path) -> Result<(), PeopleError> {
         atomic::write_json(&folder.join("fit.json"), self)?;
         self.write_page(&folder.join("fit.md"))?;
-        let text = toml::to_string(&Tables { materials: &self.tissues })
-            .map_err(|e| OutputError::Encode { what: "TOML", message: e.to_string() })?;
-        Ok(atomic::write(&folder.join("materials.toml"), text.as_bytes())?)
+        Ok(atomic::write(&folder.join("finger.toml"), self.finger.to_toml().as_bytes())?)
     }
 
-    /// Writes the page.
+    /// Writes the page, its plot into [`PICTURES`] beside it.
     ///
     /// # Errors
     /// [`OutputError`] if it cannot be written.
     pub fn write_page(&self, page: &Path) -> Result<(), OutputError> {
+        let folder = page.parent().unwrap_or_else(|| Path::new("")).join(PICTURES);
+        atomic::create_folder(&folder)?;
+        self.write_charts(&folder)?;
         atomic::write(page, self.markdown().as_bytes())
     }
 
     /// The page.
     fn markdown(&self) -> String {
         let mut text = format!("{HEAD}\n{}.", self.made);
+        if !self.records.is_empty() {
+            let _ = write!(text, " **Fitted to records: {}.**", self.records.join(", "));
+        }
         if !self.left_out.is_empty() {
             let _ = write!(text, " **Left out of this run: {}.**", self.left_out.join(", "));
         }
-        text.push_str("\n\n## Constants\n\n");
+        self.constants(&mut text);
+        self.fitted(&mut text);
+        self.halves(&mut text);
+        self.relaxation(&mut text);
+        self.judged(&mut text);
+        text.push_str(TAIL);
+        text
+    }
+
+    fn constants(&self, text: &mut String) {
         text.push_str(
-            "| constant | fitted value | lower bound | upper bound | standard error | source of the lower bound | source of the upper bound |\n\
-             |---|---|---|---|---|---|---|\n",
+            "\n\n## Constants\n\n| constant | fitted value | lower bound | upper bound | as good from | as good to | share of the bounds | do the rows tell it? | source of the lower bound | source of the upper bound |\n\
+             |---|---|---|---|---|---|---|---|---|---|\n",
         );
         for c in &self.constants {
-            let p = &c.parameter;
+            let (p, t) = (&c.parameter, &c.told);
             let _ = writeln!(
                 text,
-                "| {} | {}{} | {} | {} | {:.0} % | {} | {} |",
+                "| {} | {}{} | {} | {} | {} | {} | {:.0} % | {} | {} | {} |",
                 p.name,
                 c.value,
                 if c.at_bound { " (at its bound)" } else { "" },
                 p.low,
                 p.high,
-                100.0 * c.uncertainty,
+                digits(t.low),
+                digits(t.high),
+                100.0 * t.share,
+                t.word(),
                 p.low_source,
                 p.high_source
             );
         }
         let _ = write!(
             text,
-            "\n*Standard error* is that of the constant, as a share of the distance between its bounds on a \
-         logarithmic scale. At 100 % the rows do not determine the constant. Half the sum of the squared \
-         residuals falls from {:.3} to {:.3} in {} evaluations ({}), {:.0} s of processor time.\n\n## Rows\n\n| quantity | people | at \
-             the start | at the end | weighted residual at the end |\n|---|---|---|---|---|\n",
+            "\n![How far each constant can be moved]({PICTURES}/profiles.svg)\n\nHalf the sum of the \
+             squared residuals falls from {:.3} to {:.3}. {} fingers were simulated on the even mesh in \
+             {:.0} s of processor time, and {} on the graded mesh in {:.0} s.\n",
             self.cost[0],
             self.cost[1],
-            self.tried.len(),
-            self.end(),
-            self.solve_s
+            self.evaluated.len(),
+            self.solve_s[0],
+            self.graded,
+            self.solve_s[1]
         );
-        for r in &self.rows {
-            let [start, end] = r.here.map(digits);
-            let _ = writeln!(
-                text,
-                "| {} | {} | {start} | {end} | {:.2} |",
-                r.quantity, r.people, r.residual
-            );
-        }
-        self.relaxation(&mut text);
-        self.sets.page(&mut text);
-        text
     }
 
-    fn end(&self) -> &'static str {
-        match self.ended {
-            super::Ended::Converged => "no step gains a thousandth",
-            super::Ended::Evaluations => "the most that were allowed",
+    fn fitted(&self, text: &mut String) {
+        text.push_str(
+            "\n## Rows\n\n| quantity | people | at the start, even mesh | fitted, even mesh | fitted, graded mesh | weighted residual | within the range? | what the interpolation misses, % |\n|---|---|---|---|---|---|---|---|\n",
+        );
+        for r in &self.rows {
+            let [start, even] = [r.start, r.even].map(digits);
+            let _ = writeln!(
+                text,
+                "| {} | {} | {start} | {even} | {} | {:.2} | {} | {:.1} |",
+                r.name,
+                r.people,
+                r.graded.map_or_else(String::new, digits),
+                r.residual,
+                yes(r.met),
+                r.surrogate_percent
+            );
+        }
+    }
+
+    fn halves(&self, text: &mut String) {
+        let [first, second] = &self.halves[..] else { return };
+        let _ = write!(
+            text,
+            "\n## What one half predicts of the other\n\n| half | fitted rows within the range | predicted rows within the range |\n|---|---|---|\n"
+        );
+        for (name, half) in [("first", first), ("second", second)] {
+            let ([a, b], [c, d]) = (half.met(true), half.met(false));
+            let _ = writeln!(text, "| {name} | {a} of {b} | {c} of {d} |");
+        }
+        text.push_str(
+            "\n| quantity | people | first half fitted | is | second half fitted | is |\n|---|---|---|---|---|---|\n",
+        );
+        let is = |r: &super::halves::HalfRow| {
+            let what = if r.fitted { "fitted" } else { "predicted" };
+            format!("{what}, {}", if r.met { "within" } else { "outside" })
+        };
+        for (a, b) in first.rows.iter().zip(&second.rows) {
+            let [x, y] = [a.here, b.here].map(digits);
+            let _ =
+                writeln!(text, "| {} | {} | {x} | {} | {y} | {} |", a.name, a.people, is(a), is(b));
+        }
+        text.push_str("\n| constant | first half fitted | second half fitted |\n|---|---|---|\n");
+        let constants = self.constants.iter().zip(&first.constants).zip(&second.constants);
+        for ((c, a), b) in constants {
+            let _ = writeln!(text, "| {} | {a} | {b} |", c.parameter.name);
         }
     }
 
@@ -119,28 +162,62 @@ impl Fit {
         );
     }
 
+    fn judged(&self, text: &mut String) {
+        if self.judged.is_empty() {
+            return;
+        }
+        let met = self.judged.iter().filter(|r| near(&r.verdict)).count();
+        let _ = write!(
+            text,
+            "\n## Every row\n\n{met} of {} rows lie within people's range, or within a third of a single figure.\n\n\
+             | quantity | people | fitted finger | verdict | within a third or the range? |\n|---|---|---|---|---|\n",
+            self.judged.len()
+        );
+        for r in &self.judged {
+            let (here, near) = (r.here_text(), yes(near(&r.verdict)));
+            let _ = writeln!(
+                text,
+                "| {} | {} | {here} | {} | {near} |",
+                r.quantity,
+                r.people,
+                r.verdict.text()
+            );
+        }
+    }
+
     /// A table for people.
     #[must_use]
     pub fn human(&self) -> String {
         let mut text = String::new();
         let line = |c: &Identified| {
             let bound = if c.at_bound { " (at its bound)" } else { "" };
-            format!("{:40} {:>10}{bound}\n", c.parameter.name, c.value)
+            let Identified { parameter, value, told, .. } = c;
+            format!("{:44} {value:>10}{bound}, {}\n", parameter.name, told.word())
         };
         text.extend(self.constants.iter().map(line));
         let _ = writeln!(text, "\n{:64} {:>12} {:>8} {:>8}", "row", "people", "start", "end");
         for r in &self.rows {
-            let [start, end] = r.here.map(digits);
-            let (name, people) = (&r.quantity, &r.people);
+            let Fitted { name, people, start, even, graded, .. } = r;
+            let [start, end] = [*start, graded.unwrap_or(*even)].map(digits);
             let _ = writeln!(text, "{name:64} {people:>12} {start:>8} {end:>8}");
         }
-        let _ = writeln!(text, "\ncost {:.3} -> {:.3}, {}", self.cost[0], self.cost[1], self.end());
+        let _ = writeln!(text, "\ncost {:.3} -> {:.3}", self.cost[0], self.cost[1]);
+        self.halves(&mut text);
         self.relaxation(&mut text);
+        self.judged(&mut text);
         text
     }
 }
 
-/// Three digits.
+fn yes(v: bool) -> &'static str {
+    if v { "yes" } else { "no" }
+}
+
+/// Three or four digits.
 fn digits(v: f64) -> String {
-    if v.abs() < 1.0 { format!("{v:.4}") } else { format!("{v:.3}") }
+    match v.abs() {
+        a if a < 0.1 => format!("{v:.5}"),
+        a if a < 1.0 => format!("{v:.4}"),
+        _ => format!("{v:.3}"),
+    }
 }

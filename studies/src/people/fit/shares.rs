@@ -2,7 +2,7 @@
 
 use crate::people::PeopleError;
 use crate::people::measured::{Figure, Quantity};
-use crate::people::press::Tissues;
+use crate::people::press::Subject;
 use crate::people::tap::Tap;
 use papilla_fingertip::materials::{Moduli, PronySpec};
 use papilla_fingertip::scene::TissueTable;
@@ -63,7 +63,7 @@ pub(crate) fn asked(figures: &[Figure]) -> Option<(Vec<f64>, f64, f64, f64)> {
 
 /// One figure settles one number: the share of the shortest time, by the rule of false position.
 pub(crate) fn found(
-    table: &TissueTable,
+    subject: &Subject,
     (time_s, depth_mm, tap_s, percent): (Vec<f64>, f64, f64, f64),
     folder: &Path,
     told: &mut dyn FnMut(f64),
@@ -72,8 +72,8 @@ pub(crate) fn found(
     let mut lost = |first_share: f64| {
         told(first_share);
         let series = series(&time_s, first_share);
-        let tissues = Tissues { table: relaxing(table, &series), hyperelastic: true };
-        let tap = Tap::found_or_solved(&tissues, true, depth_mm, tap_s, folder)?;
+        let subject = Subject { table: relaxing(&subject.table, &series), ..subject.clone() };
+        let tap = Tap::found_or_solved(&subject, true, depth_mm, tap_s, folder)?;
         let Tap { lost_percent, force_n_max, solve_s, .. } = tap;
         taps.push(Tapped { first_share, lost_percent, force_n_max, solve_s });
         Ok::<_, PeopleError>(lost_percent - percent)
@@ -115,6 +115,13 @@ pub(crate) fn series(time_s: &[f64], first_share: f64) -> PronySpec {
     PronySpec { share, time_s: time_s.to_vec(), moduli: Moduli::LongTerm }
 }
 
+/// The series of what relaxes with each time over what stays.
+pub(crate) fn over_stays(time_s: &[f64], over_stays: &[f64]) -> PronySpec {
+    let all = 1.0 + over_stays.iter().sum::<f64>();
+    let share = over_stays.iter().map(|a| a / all).collect();
+    PronySpec { share, time_s: time_s.to_vec(), moduli: Moduli::LongTerm }
+}
+
 /// The same tissues, the soft ones relaxing.
 pub(crate) fn relaxing(table: &TissueTable, series: &PronySpec) -> TissueTable {
     let mut table = table.clone();
@@ -144,5 +151,8 @@ mod tests {
         let (law, scale) = series.series().unwrap();
         assert!((law.long_term_share() - 0.1).abs() < 1e-12 && (scale - 10.0).abs() < 1e-9);
         assert!((series.share[1] - 0.1).abs() < 1e-12 && series.share[1] == series.share[2]);
+        // Seven times as much as stays relaxes first, as much as stays with either other time.
+        let same = over_stays(&series.time_s, &[7.0, 1.0, 1.0]);
+        assert!(same.share.iter().zip(&series.share).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 }

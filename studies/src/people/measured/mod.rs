@@ -1,5 +1,9 @@
 //! The measurements, read from `measured.toml` or a file like it.
 
+mod quantity;
+
+pub use quantity::Quantity;
+
 use crate::people::PeopleError;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -33,82 +37,14 @@ pub struct Figure {
     /// Largest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_most: Option<f64>,
+    /// Least.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_least: Option<f64>,
     /// Where it is published.
     pub source: String,
     /// Whether it was not read there.
     #[serde(default)]
     pub second_hand: bool,
-}
-
-/// What is measured of the pad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "of", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Quantity {
-    /// `dF/dd` under a plate, N/mm.
-    Stiffness {
-        /// Force, N.
-        force_n: f64,
-        /// Inclination of the plate, tip first, degrees.
-        pitch_deg: f64,
-    },
-    /// Stiffness at one force over that at another.
-    Stiffening {
-        /// Smaller force, N.
-        from_n: f64,
-        /// Larger force, N.
-        to_n: f64,
-        /// Inclination of the plate, degrees.
-        pitch_deg: f64,
-    },
-    /// R2 of the line of stiffness over force, which an exponential law makes 1.
-    Exponential {
-        /// Largest force, N.
-        to_n: f64,
-        /// Inclination of the plate, degrees.
-        pitch_deg: f64,
-    },
-    /// A time of the reduced relaxation, s.
-    RelaxationTime {
-        /// 1 is the shortest.
-        rank: usize,
-    },
-    /// Peak over mean of the pressure under a plate.
-    PeakOverMean {
-        /// Force, N.
-        force_n: f64,
-        /// Inclination of the plate, degrees.
-        pitch_deg: f64,
-    },
-    /// Contact area at one force over that at another.
-    AreaRatio {
-        /// Smaller force, N.
-        from_n: f64,
-        /// Larger force, N.
-        to_n: f64,
-        /// Inclination of the plate, degrees.
-        pitch_deg: f64,
-    },
-    /// Young's modulus of Hertz' law under a plate, MPa.
-    HertzModulus {
-        /// Force, N.
-        force_n: f64,
-        /// Inclination of the plate, degrees.
-        pitch_deg: f64,
-    },
-    /// Largest loss of volume under a plate, %.
-    VolumeLost {
-        /// Largest force, N.
-        to_n: f64,
-        /// Inclination of the plate, degrees.
-        pitch_deg: f64,
-    },
-    /// Energy lost in a tap with a plate, %.
-    EnergyLost {
-        /// Depth, mm.
-        depth_mm: f64,
-        /// Time down, and time up again, s.
-        time_s: f64,
-    },
 }
 
 /// Rates of SA1 afferents under spheres.
@@ -187,85 +123,27 @@ impl Figure {
     /// What people have, as tables say it.
     #[must_use]
     pub(crate) fn people(&self) -> String {
-        match (self.range, self.at_most, self.value) {
-            (Some([low, high]), ..) => format!("{low} to {high}"),
-            (_, Some(most), _) => format!("at most {most}"),
-            (.., value) => format!("{}", value.unwrap_or(f64::NAN)),
+        match *self {
+            Self { range: Some([low, high]), .. } => format!("{low} to {high}"),
+            Self { at_most: Some(most), .. } => format!("at most {most}"),
+            Self { at_least: Some(least), .. } => format!("at least {least}"),
+            Self { value, .. } => format!("{}", value.unwrap_or(f64::NAN)),
         }
     }
 
     fn validate(&self, at: &str) -> Result<(), PeopleError> {
-        let given = [self.value.is_some(), self.range.is_some(), self.at_most.is_some()];
-        let count = given.iter().filter(|g| **g).count();
-        require(count == 1, at, "has to have exactly one of value, range and at_most", &count)?;
-        let numbers = self.value.into_iter().chain(self.range.into_iter().flatten());
-        let numbers: Vec<f64> = numbers.chain(self.at_most).collect();
+        let bounds = [self.value, self.at_most, self.at_least];
+        let count =
+            usize::from(self.range.is_some()) + bounds.iter().filter(|b| b.is_some()).count();
+        let rule = "has to have exactly one of value, range, at_most and at_least";
+        require(count == 1, at, rule, &count)?;
+        let numbers = bounds.into_iter().flatten().chain(self.range.into_iter().flatten());
+        let numbers: Vec<f64> = numbers.collect();
         let positive = numbers.iter().all(|v| v.is_finite() && *v > 0.0);
         require(positive, at, "has to have positive finite numbers", &format!("{numbers:?}"))?;
         let rises = self.range.is_none_or(|[low, high]| low < high);
         require(rises, &format!("{at}.range"), "has to rise", &format!("{numbers:?}"))?;
         self.quantity.validate(&format!("{at}.quantity"))
-    }
-}
-
-impl Quantity {
-    /// The plate press that it is read from: inclination, degrees, and largest force, N.
-    #[must_use]
-    pub fn plate(&self) -> Option<(f64, f64)> {
-        match *self {
-            Self::Stiffness { force_n, pitch_deg }
-            | Self::PeakOverMean { force_n, pitch_deg }
-            | Self::HertzModulus { force_n, pitch_deg } => Some((pitch_deg, force_n)),
-            Self::Stiffening { to_n, pitch_deg, .. }
-            | Self::Exponential { to_n, pitch_deg }
-            | Self::AreaRatio { to_n, pitch_deg, .. }
-            | Self::VolumeLost { to_n, pitch_deg } => Some((pitch_deg, to_n)),
-            Self::RelaxationTime { .. } | Self::EnergyLost { .. } => None,
-        }
-    }
-
-    /// The same at forces of at most `most_n`, N.
-    #[must_use]
-    pub(crate) fn at_most_n(&self, most_n: f64) -> Self {
-        let mut less = *self;
-        match &mut less {
-            Self::Stiffness { force_n, .. }
-            | Self::PeakOverMean { force_n, .. }
-            | Self::HertzModulus { force_n, .. }
-            | Self::Exponential { to_n: force_n, .. }
-            | Self::VolumeLost { to_n: force_n, .. } => *force_n = force_n.min(most_n),
-            Self::Stiffening { from_n, to_n, .. } | Self::AreaRatio { from_n, to_n, .. } => {
-                *from_n = from_n.min(most_n);
-                *to_n = to_n.min(most_n);
-            }
-            Self::RelaxationTime { .. } | Self::EnergyLost { .. } => {}
-        }
-        less
-    }
-
-    fn validate(&self, at: &str) -> Result<(), PeopleError> {
-        if let Some((pitch_deg, force_n)) = self.plate() {
-            force(force_n, at)?;
-            let name = format!("{at}.pitch_deg");
-            require((0.0..=60.0).contains(&pitch_deg), &name, "has to be 0 to 60", &pitch_deg)?;
-        }
-        match *self {
-            Self::Stiffening { from_n, to_n, .. } | Self::AreaRatio { from_n, to_n, .. } => {
-                let name = format!("{at}.from_n");
-                require(from_n > 0.0 && from_n < to_n, &name, "has to be 0 to to_n", &from_n)
-            }
-            Self::RelaxationTime { rank } => {
-                require(rank >= 1, &format!("{at}.rank"), "has to be 1 or more", &rank)
-            }
-            Self::EnergyLost { depth_mm, time_s } => {
-                let name = format!("{at}.depth_mm");
-                let deep = (0.1..=4.0).contains(&depth_mm);
-                require(deep, &name, "has to be 0.1 to 4 mm", &depth_mm)?;
-                let name = format!("{at}.time_s");
-                require((1e-4..=1e3).contains(&time_s), &name, "has to be 1e-4 to 1e3 s", &time_s)
-            }
-            _ => Ok(()),
-        }
     }
 }
 

@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn what_is_shipped_is_read() {
     let measured = Measured::shipped().unwrap();
-    assert!(measured.figures.len() >= 18);
+    assert!(measured.figures.len() >= 24);
     assert_eq!(measured.sa1.rate_per_s.len(), 3);
 }
 

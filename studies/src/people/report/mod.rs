@@ -65,18 +65,22 @@ pub struct Row {
 impl Row {
     /// The finger's figure, or why there is none, beside people's.
     pub(crate) fn new(figure: &Figure, here: Result<f64, String>) -> Self {
-        let Figure { quantity, value, range, at_most, source, second_hand } = figure;
+        let Figure { quantity, value, range, at_most, at_least, source, second_hand } = figure;
         let within = |ok: bool| if ok { Verdict::Ok } else { Verdict::Failed };
-        let (spread, verdict): (_, Box<dyn Fn(f64) -> Verdict>) = match (*range, *at_most, *value) {
-            (Some([low, high]), ..) => {
-                ("least and largest", Box::new(move |v| within(low <= v && v <= high)))
-            }
-            (_, Some(most), _) => ("largest", Box::new(move |v| within(v <= most))),
-            (.., value) => {
-                let value = value.unwrap_or(f64::NAN);
-                ("one figure, no spread", Box::new(move |v| Verdict::TimesPeople(v / value)))
-            }
-        };
+        let (spread, verdict): (_, Box<dyn Fn(f64) -> Verdict>) =
+            match (*range, at_most.or(*at_least), *value) {
+                (Some([low, high]), ..) => {
+                    ("least and largest", Box::new(move |v| within(low <= v && v <= high)))
+                }
+                (_, Some(bound), _) if at_least.is_some() => {
+                    ("least", Box::new(move |v| within(v >= bound)))
+                }
+                (_, Some(bound), _) => ("largest", Box::new(move |v| within(v <= bound))),
+                (.., value) => {
+                    let value = value.unwrap_or(f64::NAN);
+                    ("one figure, no spread", Box::new(move |v| Verdict::TimesPeople(v / value)))
+                }
+            };
         let verdict = match &here {
             Ok(here) => verdict(*here),
             Err(why) => Verdict::NotReached(why.clone()),
@@ -149,6 +153,8 @@ pub struct Report {
     pub made: String,
     /// Laws and constants of the tissues.
     pub materials: Materials,
+    /// Name of the finger, if it is not the default one.
+    pub finger: Option<String>,
     /// Mesh of the spheres' states.
     pub density: Density,
     /// A row a figure.
@@ -162,10 +168,11 @@ pub struct Report {
 }
 
 impl Report {
-    pub(crate) fn new(materials: Materials, density: Density) -> Self {
+    pub(crate) fn new(materials: Materials, finger: Option<String>, density: Density) -> Self {
         Self {
             made: today_here(),
             materials,
+            finger,
             density,
             rows: Vec::new(),
             afferents: None,
@@ -241,7 +248,7 @@ mod tests {
     fn figure(value: Option<f64>, range: Option<[f64; 2]>, at_most: Option<f64>) -> Figure {
         let quantity = Quantity::VolumeLost { to_n: 10.0, pitch_deg: 0.0 };
         let source = "somebody".into();
-        Figure { quantity, value, range, at_most, source, second_hand: true }
+        Figure { quantity, value, range, at_most, at_least: None, source, second_hand: true }
     }
 
     #[test]
@@ -251,6 +258,9 @@ mod tests {
         assert_eq!(verdict(figure(None, Some([1.0, 2.0]), None), 2.5), Verdict::Failed);
         assert_eq!(verdict(figure(None, None, Some(5.0)), 5.1), Verdict::Failed);
         assert_eq!(verdict(figure(Some(4.0), None, None), 1.0), Verdict::TimesPeople(0.25));
+        let least = Figure { at_least: Some(1.0), ..figure(None, None, None) };
+        assert_eq!(verdict(least.clone(), 1.2), Verdict::Ok);
+        assert_eq!(verdict(least, 0.4), Verdict::Failed);
         let row = Row::new(&figure(Some(4.0), None, None), Err("stuck".into()));
         assert_eq!((row.here, row.verdict), (None, Verdict::NotReached("stuck".into())));
         assert!(row.source.contains("(second hand)"));

@@ -43,11 +43,11 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "{}{}. Materials: {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
+            "{}{}. {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
              `coarse`.\n\n## Rows\n\n| quantity | the model | people | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
             HEAD.replace("DENSITY", density(self.density)),
             self.made,
-            self.materials.name(),
+            self.finger_text(),
             density(self.density)
         );
         for r in &self.rows {
@@ -73,6 +73,13 @@ impl Report {
             self.plates(&mut text);
         }
         text
+    }
+
+    fn finger_text(&self) -> String {
+        match &self.finger {
+            Some(name) => format!("Finger: {name}, {} law", self.materials.law()),
+            None => format!("The default finger. Materials: {}", self.materials.name()),
+        }
     }
 
     fn plates(&self, text: &mut String) {

@@ -37,6 +37,21 @@ pub(crate) fn quantity(quantity: &Quantity) -> String {
         Quantity::EnergyLost { depth_mm, time_s } => {
             format!("energy lost in a tap of {depth_mm} mm, {:.0} ms down and up, %", 1e3 * time_s)
         }
+        Quantity::EnergyOutside { force_n, shift_mm, .. } => {
+            format!(
+                "share of the skin's strain energy outside of contact, plate at {force_n} N moved by \
+                 {shift_mm} mm"
+            )
+        }
+        Quantity::ProfileTurn { curvature_per_m, turn_deg, .. } => {
+            format!(
+                "SA1 from SED at the interface: turn of the profile under a cylinder of \
+                 {curvature_per_m} 1/m turned by {turn_deg} degrees, degrees"
+            )
+        }
+        Quantity::ShearRatio { from_n, to_n } => {
+            format!("vertical over horizontal shear of the epidermis from {from_n} to {to_n} N")
+        }
     }
 }
 
@@ -55,5 +70,10 @@ pub(super) const fn mends(quantity: &Quantity) -> &'static str {
         }
         Quantity::PeakOverMean { .. } => "tissue that stiffens as it is squeezed, or a finer mesh",
         Quantity::VolumeLost { .. } => "a Poisson's ratio nearer to 1/2",
+        Quantity::EnergyOutside { .. } => {
+            "another course of friction; the preprint's is not known here"
+        }
+        Quantity::ProfileTurn { .. } => "another pad: its curvatures turn the profile",
+        Quantity::ShearRatio { .. } => "ridges: smooth skin stays flat on a plate",
     }
 }
