@@ -2,6 +2,7 @@
 
 use papilla_fe_datagen::cli::{print, refuse_unknown};
 use papilla_progress::Progress;
+use papilla_studies::people::fit::parameters::{Moved, PARAMETERS};
 use papilla_studies::people::fit::{self, Options, PARTS, record};
 use papilla_studies::people::measured::Measured;
 use std::path::PathBuf;
@@ -28,8 +29,12 @@ pub(super) struct Args {
     /// Only this part beside the constants (constants, halves, taps, rows); may be given several times.
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
+    /// Only move these constants (fat, exponent, dermis, epidermis, pulp, bone, crease, thickness, nail);
+    /// may be given several times.
+    #[arg(long = "move", value_name = "CONSTANT")]
+    moved: Vec<String>,
     /// Fingers simulated before the first search: the start and points spread over the bounds.
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(12..=1000))]
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(3..=1000))]
     design: u16,
     /// Fingers simulated after it at most.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(0..=1000))]
@@ -60,7 +65,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let read = |path: &PathBuf| Ok((path.display().to_string(), record::read(path)?));
     let records = args.record.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
+    refuse_unknown(&args.moved, &PARAMETERS.map(|p| p.key))?;
     let options = Options {
+        moved: Moved::named(&args.moved),
         design: args.design.into(),
         rounds: args.rounds.into(),
         graded: args.graded.into(),

@@ -128,7 +128,7 @@ mod tests {
         let values: Vec<f64> = at.iter().map(|p| (-3.0 * depth(*p)).exp()).collect();
         let found = Profile::fitted(&at, &values);
         assert!(found.turn_deg > 1.3 * 9.0, "{found:?}");
-        assert!((found.turn_deg / exact - 1.0).abs() < 0.02, "{found:?} {exact}");
+        assert!((found.turn_deg / exact - 1.0).abs() < 0.05, "{found:?} {exact}");
     }
 
     /// On the finger itself a profile turns with the cylinder, and by nothing with one that is not

@@ -2,7 +2,7 @@
 
 use super::adapt::{Evaluated, plus, refine};
 use super::objective::{Data, Target};
-use super::parameters::{PARAMETERS, values};
+use super::parameters::values;
 use super::simulated::Simulated;
 use crate::people::PeopleError;
 use serde::Serialize;
@@ -13,7 +13,7 @@ const ROUNDS: usize = 4;
 /// One half, fitted alone.
 #[derive(Clone, Debug, Serialize)]
 pub struct Half {
-    /// Constants that need a simulation.
+    /// Constants that were moved.
     pub constants: Vec<f64>,
     /// Every row.
     pub rows: Vec<HalfRow>,
@@ -52,7 +52,7 @@ pub(crate) fn new(
     correction: &[f64],
     extras: &[f64],
 ) -> Result<Vec<Half>, PeopleError> {
-    let mut halves = Vec::new();
+    let (mut halves, parameters) = (Vec::new(), simulated.moved.parameters());
     for fitted in data.halves() {
         let residuals = |f: &[f64], e: &[f64]| data.residuals(&fitted, &plus(f, correction), e);
         let even = &mut |at: &[f64]| simulated.even(at);
@@ -67,7 +67,7 @@ pub(crate) fn new(
             met: t.met(here[k]),
         };
         halves.push(Half {
-            constants: values(&PARAMETERS, &found.at),
+            constants: values(&parameters, &found.at),
             rows: data.targets.iter().enumerate().map(row).collect(),
         });
     }

@@ -32,7 +32,7 @@ use papilla_fingertip::scene::Finger;
 use papilla_fingertip::scene::finger::Source;
 use papilla_output::atomic;
 use papilla_progress::processor::today_here;
-use parameters::{PARAMETERS, Parameter, RELAXATION_TIMES_S, start, values};
+use parameters::{Moved, Parameter, RELAXATION_TIMES_S, start, values};
 use profile::Told;
 use record::RecordedPress;
 use serde::Serialize;
@@ -86,6 +86,8 @@ pub struct Fit {
     pub left_out: Vec<&'static str>,
     /// The constants.
     pub constants: Vec<Identified>,
+    /// Constants that were not moved.
+    pub held: Vec<Parameter>,
     /// Half the sum of squared residuals at the start and at the end.
     pub cost: [f64; 2],
     /// Rows.
@@ -110,6 +112,8 @@ pub struct Fit {
 /// What is fitted to, and how far.
 #[derive(Clone, Debug)]
 pub struct Options {
+    /// The constants that are moved.
+    pub moved: Moved,
     /// Points simulated before the first search.
     pub design: usize,
     /// Points simulated after it at most.
@@ -145,11 +149,13 @@ pub fn run(
         false => Data::recorded(presses.into_iter().flatten().collect()),
     };
     let all = options.design + options.rounds + options.graded;
-    let mut simulated = Simulated::new(&data, folder, told, all);
+    let moved = &options.moved;
+    let parameters = moved.parameters();
+    let mut simulated = Simulated::new((&data, moved), folder, told, all);
     let extras = start(data.extras());
     let every: Vec<usize> = (0..data.targets.len()).collect();
     let mut evaluated =
-        design(&start(&PARAMETERS), options.design, &mut |at: &[f64]| simulated.even(at))?;
+        design(&start(&parameters), options.design, &mut |at: &[f64]| simulated.even(at))?;
     let first = evaluated[0].clone();
     let (optimum, correction, graded) =
         corrected(&data, &mut simulated, &mut evaluated, options, (&every, &extras))?;
@@ -159,11 +165,11 @@ pub fn run(
     };
     let residuals = |f: &[f64], e: &[f64]| data.residuals(&every, &plus(f, &correction), e);
     let landscape = Landscape::new(&evaluated, &residuals, &extras);
-    let constants = constants(&landscape, &data, &optimum);
+    let constants = constants(&landscape, [&parameters, data.extras()], &optimum);
     let rows = rows(&data, (&evaluated, &first), &optimum, (&correction, graded > 0));
     let cost = [own(&first, &residuals, &extras).cost, optimum.cost];
     let solve_s = simulated.solve_s;
-    let mut subject = simulated::subject(&optimum.at);
+    let mut subject = simulated::subject(moved, &optimum.at);
     let (mut shares, mut judged) = (None, Vec::new());
     if names.is_empty() {
         let told = &mut |what: &str| told(what, all, all);
@@ -188,6 +194,7 @@ pub fn run(
         records: names,
         left_out: PARTS.into_iter().filter(|p| !wanted(p)).collect(),
         constants,
+        held: moved.held(),
         cost,
         rows,
         evaluated,
@@ -237,8 +244,12 @@ fn corrected(
     }
 }
 
-fn constants(landscape: &Landscape<'_>, data: &Data, optimum: &Optimum) -> Vec<Identified> {
-    let parameters: Vec<&Parameter> = PARAMETERS.iter().chain(data.extras()).collect();
+fn constants(
+    landscape: &Landscape<'_>,
+    parameters: [&[Parameter]; 2],
+    optimum: &Optimum,
+) -> Vec<Identified> {
+    let parameters: Vec<&Parameter> = parameters.into_iter().flatten().collect();
     let at: Vec<f64> = optimum.at.iter().chain(&optimum.extras).copied().collect();
     let one = |(k, parameter): (usize, &&Parameter)| Identified {
         parameter: **parameter,

@@ -8,7 +8,7 @@ use crate::people::measured::{Figure, Measured, Quantity};
 use crate::people::pad;
 use crate::people::press::{Cells, Press, Subject};
 use crate::people::report::words;
-use crate::people::solution::{Course, Reads, Solution, until};
+use crate::people::solution::{Course, Reads, Solution};
 use crate::people::study::plates;
 use std::mem::discriminant;
 use std::path::Path;

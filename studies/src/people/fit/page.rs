@@ -74,6 +74,11 @@ impl Fit {
                 p.high_source
             );
         }
+        if !self.held.is_empty() {
+            let held = |p: &super::Parameter| format!("{} ({})", p.name, p.start);
+            let held: Vec<String> = self.held.iter().map(held).collect();
+            let _ = write!(text, "\nNot moved: {}.\n", held.join("; "));
+        }
         let _ = write!(
             text,
             "\n![How far each constant can be moved]({PICTURES}/profiles.svg)\n\nHalf the sum of the \

@@ -8,6 +8,8 @@ use serde::Serialize;
 /// One constant and its bounds.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Parameter {
+    /// What the command line calls it.
+    pub key: &'static str,
     /// Its name, with its unit.
     pub name: &'static str,
     /// Least value.
@@ -34,9 +36,11 @@ const BASE_PULP_MM: f64 = 0.6;
 /// A bound that no print was found for.
 const ASSUMED: &str = "assumed";
 
-/// Constants that need a simulation: of the tissues, then of the shape.
+/// Constants that need a simulation: of the tissues, then of the shape. A search begins with the set
+/// `people` and the default shape.
 pub const PARAMETERS: [Parameter; 9] = [
     Parameter {
+        key: "fat",
         name: "shear modulus of fat, MPa",
         low: 0.001_084,
         high: 0.0165,
@@ -46,24 +50,27 @@ pub const PARAMETERS: [Parameter; 9] = [
         high_source: "Erdemir, Viveiros, Ulbrecht & Cavanagh 2006 (heel pads; second hand)",
     },
     Parameter {
+        key: "exponent",
         name: "exponent of fat",
         low: 2.0,
         high: 9.78,
-        start: 9.0,
+        start: 9.78,
         log: true,
         low_source: "neo-Hooke, as the set `papers`",
         high_source: "Chokhandre, Halloran, van den Bogert & Erdemir 2012 (abstract)",
     },
     Parameter {
+        key: "dermis",
         name: "shear modulus of dermis, MPa",
         low: 0.027,
         high: 0.11,
-        start: 0.04,
+        start: 0.027,
         log: true,
         low_source: "Maeno, Kobayashi & Yamazaki 1998 (E = .080 MPa)",
         high_source: "Shergold & Fleck 2005 (human skin; second hand)",
     },
     Parameter {
+        key: "epidermis",
         name: "Young's modulus of epidermis, MPa",
         low: 0.136,
         high: 2.0,
@@ -73,15 +80,17 @@ pub const PARAMETERS: [Parameter; 9] = [
         high_source: "Geerligs et al. 2011 (1 to 2 MPa; abstract)",
     },
     Parameter {
+        key: "pulp",
         name: "pulp between skin and bone, mm",
         low: 3.5,
         high: 7.5,
-        start: 6.5,
+        start: 6.78,
         log: false,
         low_source: ASSUMED,
         high_source: "the default finger (6.78 mm) and a tenth more: assumed",
     },
     Parameter {
+        key: "bone",
         name: "size of the bone over the default's",
         low: 0.75,
         high: 1.25,
@@ -91,15 +100,17 @@ pub const PARAMETERS: [Parameter; 9] = [
         high_source: ASSUMED,
     },
     Parameter {
+        key: "crease",
         name: "rise of the pad to the crease, of what the bone leaves room for",
         low: 0.1,
         high: 0.9,
-        start: 0.5,
+        start: 0.534,
         log: false,
         low_source: ASSUMED,
         high_source: ASSUMED,
     },
     Parameter {
+        key: "thickness",
         name: "thickness of dermis, mm",
         low: 0.6,
         high: 1.6,
@@ -109,6 +120,7 @@ pub const PARAMETERS: [Parameter; 9] = [
         high_source: ASSUMED,
     },
     Parameter {
+        key: "nail",
         name: "width of the nail, mm",
         low: 9.0,
         high: 14.0,
@@ -133,7 +145,8 @@ const RELAXES: [&str; 3] = [
 
 const fn relaxing(name: &'static str) -> Parameter {
     let (low_source, high_source) = (ASSUMED, ASSUMED);
-    Parameter { name, low: 0.01, high: 40.0, start: 0.3, log: true, low_source, high_source }
+    let key = "relaxation";
+    Parameter { key, name, low: 0.01, high: 40.0, start: 0.3, log: true, low_source, high_source }
 }
 
 impl Parameter {
@@ -153,6 +166,39 @@ impl Parameter {
             true => (value / self.low).ln() / (self.high / self.low).ln(),
             false => (value - self.low) / (self.high - self.low),
         }
+    }
+}
+
+/// Some of [`PARAMETERS`], of which the others stay where a search begins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Moved(Vec<usize>);
+
+impl Moved {
+    /// The parameters with these keys; of none, all.
+    #[must_use]
+    pub fn named(keys: &[String]) -> Self {
+        let wanted = |k: &usize| keys.is_empty() || keys.iter().any(|n| n == PARAMETERS[*k].key);
+        Self((0..PARAMETERS.len()).filter(wanted).collect())
+    }
+
+    /// Those that are moved.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<Parameter> {
+        self.0.iter().map(|&k| PARAMETERS[k]).collect()
+    }
+
+    /// Those that are not.
+    #[must_use]
+    pub fn held(&self) -> Vec<Parameter> {
+        (0..PARAMETERS.len()).filter(|k| !self.0.contains(k)).map(|k| PARAMETERS[k]).collect()
+    }
+
+    /// Values of all parameters at a point of the moved ones.
+    #[must_use]
+    pub fn all_values(&self, at: &[f64]) -> Vec<f64> {
+        let mut whole = start(&PARAMETERS);
+        self.0.iter().zip(at).for_each(|(&k, x)| whole[k] = *x);
+        values(&PARAMETERS, &whole)
     }
 }
 
@@ -225,10 +271,22 @@ mod tests {
     fn a_search_begins_within_its_bounds() {
         for p in PARAMETERS.iter().chain(&RELAXATION) {
             let at = p.place(p.start);
-            assert!(0.0 < at && at < 1.0, "{}: {at}", p.name);
+            assert!((0.0..=1.0).contains(&at), "{}: {at}", p.name);
             assert!((p.value(at) / p.start - 1.0).abs() < 1e-12);
             assert!((p.value(0.0) / p.low - 1.0).abs() < 1e-12 && p.place(p.high) == 1.0);
         }
+    }
+
+    #[test]
+    fn what_is_not_moved_stays_where_the_search_begins() {
+        let moved = Moved::named(&["pulp".into(), "fat".into()]);
+        let values = moved.all_values(&[0.0, 1.0]);
+        for (k, p) in PARAMETERS.iter().enumerate() {
+            let due = [p.low, p.start, p.high][[0, 1, 1, 1, 2, 1, 1, 1, 1][k]];
+            assert!((values[k] / due - 1.0).abs() < 1e-3, "{}: {}", p.name, values[k]);
+        }
+        assert_eq!((moved.parameters().len(), moved.held().len()), (2, PARAMETERS.len() - 2));
+        assert_eq!(Moved::named(&[]).parameters().len(), PARAMETERS.len());
     }
 
     #[test]

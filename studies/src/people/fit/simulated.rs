@@ -1,7 +1,7 @@
 //! Points of a search as fingers, simulated.
 
 use super::objective::Data;
-use super::parameters::{PARAMETERS, shape, table, values};
+use super::parameters::{Moved, shape, table};
 use crate::people::PeopleError;
 use crate::people::press::{Cells, Subject};
 use papilla_fingertip::mesh::fingertip::Density;
@@ -11,6 +11,8 @@ use std::path::Path;
 /// Simulates points of the unit box, and counts.
 pub(crate) struct Simulated<'a> {
     data: &'a Data,
+    /// The constants that points are of.
+    pub moved: &'a Moved,
     folder: &'a Path,
     told: &'a mut dyn FnMut(&str, usize, usize),
     done: usize,
@@ -20,8 +22,8 @@ pub(crate) struct Simulated<'a> {
 }
 
 /// The finger at a point of the unit box.
-pub(crate) fn subject(at: &[f64]) -> Subject {
-    let values = values(&PARAMETERS, at);
+pub(crate) fn subject(moved: &Moved, at: &[f64]) -> Subject {
+    let values = moved.all_values(at);
     Subject { shape: shape(&values), table: table(&values), hyperelastic: true }
 }
 
@@ -32,12 +34,12 @@ pub(crate) fn finger(subject: &Subject) -> Finger {
 
 impl<'a> Simulated<'a> {
     pub(crate) fn new(
-        data: &'a Data,
+        (data, moved): (&'a Data, &'a Moved),
         folder: &'a Path,
         told: &'a mut dyn FnMut(&str, usize, usize),
         all: usize,
     ) -> Self {
-        Self { data, folder, told, done: 0, all, solve_s: [0.0; 2] }
+        Self { data, moved, folder, told, done: 0, all, solve_s: [0.0; 2] }
     }
 
     /// Features on the even coarse mesh.
@@ -55,7 +57,7 @@ impl<'a> Simulated<'a> {
         let what = ["presses", "presses on the graded mesh"][mesh];
         (self.told)(what, self.done.min(self.all), self.all);
         self.done += 1;
-        let subject = subject(at);
+        let subject = subject(self.moved, at);
         match self.data.solved(&subject, cells, self.folder) {
             Ok(solutions) => {
                 self.solve_s[mesh] += solutions.iter().map(|s| s.solve_s).sum::<f64>();

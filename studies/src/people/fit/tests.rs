@@ -37,13 +37,19 @@ fn a_record_that_was_simulated_is_fitted_again() {
     let truth = [0.7, 0.5, 0.4, 0.6, 0.6, 0.5, 0.5, 0.4, 0.4];
     let relaxes = [0.2, 0.4, 0.3];
     let data = Data::recorded(presses.clone());
-    let subject = simulated::subject(&truth);
+    let subject = simulated::subject(&Moved::named(&[]), &truth);
     let solved = data.solved(&subject, Cells::COARSE, folder.path()).unwrap();
     let features = data.features(&subject, &solved).unwrap();
     let forces = data.here(&features, &relaxes);
     let samples = presses.iter_mut().flat_map(|p| &mut p.samples);
     samples.zip(&forces).for_each(|(s, f)| s.force_n = *f);
-    let options = Options { design: 20, rounds: 8, graded: 0, only: vec!["constants".into()] };
+    let options = Options {
+        moved: Moved::named(&[]),
+        design: 20,
+        rounds: 8,
+        graded: 0,
+        only: vec!["constants".into()],
+    };
     let records = vec![("made.csv".to_owned(), presses)];
     let measured = Measured::shipped().unwrap();
     let fit = run(&measured, records, &options, folder.path(), &mut |_, _, _| ()).unwrap();
