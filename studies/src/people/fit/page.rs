@@ -10,7 +10,7 @@ use std::path::Path;
 /// What the page says before its tables.
 const HEAD: &str = include_str!("head.md");
 /// What it says after them.
-const TAIL: &str = include_str!("tail.md");
+const TAIL: &str = include_str!("set/head.md");
 /// Folder of the plots, beside the page.
 const PICTURES: &str = "pictures/fit";
 
@@ -35,7 +35,8 @@ impl Fit {
 
     /// The page.
     fn markdown(&self) -> String {
-        let mut text = format!("{HEAD}\n{}.", self.made);
+        let head = HEAD.replace("VERDICT", &self.verdict());
+        let mut text = format!("{head}\n{}.", self.made);
         if !self.records.is_empty() {
             let _ = write!(text, " **Fitted to records: {}.**", self.records.join(", "));
         }
@@ -48,6 +49,34 @@ impl Fit {
         self.relaxation(&mut text);
         self.judged(&mut text);
         text.push_str(TAIL);
+        text
+    }
+
+    /// What the rows say, in a sentence each.
+    fn verdict(&self) -> String {
+        let met = self.rows.iter().filter(|r| r.met).count();
+        let named = |word: &str| {
+            let of = self.constants.iter().filter(|c| c.told.word() == word);
+            let names: Vec<&str> = of.map(|c| c.parameter.name).collect();
+            if names.is_empty() { "none".to_owned() } else { names.join("; ") }
+        };
+        let mut text = format!(
+            "{met} of {} fitted rows lie within their range. The rows tell these constants: {}. They do \
+             not tell these: {}.",
+            self.rows.len(),
+            named("told"),
+            named("not told")
+        );
+        if !self.judged.is_empty() {
+            let near = self.judged.iter().filter(|r| near(&r.verdict)).count();
+            let bar = if 4 * near >= 3 * self.judged.len() { "reached" } else { "not reached" };
+            let _ = write!(
+                text,
+                " Of all rows, {near} of {} lie within people's range or within a third of a single \
+                 figure. Three in four were asked before a finger of this kind is shipped: {bar}.",
+                self.judged.len()
+            );
+        }
         text
     }
 

@@ -155,7 +155,7 @@ impl Quantity {
             Self::ProfileTurn { curvature_per_m, turn_deg, force_n } => {
                 force(force_n, at)?;
                 let name = format!("{at}.curvature_per_m");
-                let sane = curvature_per_m >= 50.0 && curvature_per_m <= CURVATURE_MAX_PER_M;
+                let sane = (50.0..=CURVATURE_MAX_PER_M).contains(&curvature_per_m);
                 require(sane, &name, "has to be 50 to 2000 1/m", &curvature_per_m)?;
                 let name = format!("{at}.turn_deg");
                 require((0.0..=45.0).contains(&turn_deg), &name, "has to be 0 to 45", &turn_deg)
