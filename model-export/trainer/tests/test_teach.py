@@ -181,12 +181,12 @@ def test_more_presses_keep_those_that_are_solved(finger: Path) -> None:
 
 
 def test_a_changed_finger_or_a_stranger_is_refused(finger: Path) -> None:
-    stranger = finger / "nano.onnx"
-    stranger.write_bytes((REPOSITORY / "models/nano.onnx").read_bytes())
-    (finger / "nano.json").write_bytes((REPOSITORY / "models/nano.json").read_bytes())
-    assert "add --network nano" in refused(finger)
+    stranger = finger / "small.onnx"
+    stranger.write_bytes((REPOSITORY / "models/small.onnx").read_bytes())
+    (finger / "small.json").write_bytes((REPOSITORY / "models/small.json").read_bytes())
+    assert "add --network small" in refused(finger)
     stranger.unlink()
-    (finger / "nano.json").unlink()
+    (finger / "small.json").unlink()
     file = finger / "finger.toml"
     text = file.read_text()
     file.write_text(text.replace("width_mm = 16.0", "width_mm = 16.5"))
