@@ -49,8 +49,8 @@ fn grow(name: &str, value: &mut Value) {
 fn hand() -> (Hand, [f32; 3]) {
     let (atlas, samples) = (&PRESSED.atlas, PRESSED.samples());
     let models = tiny_models(atlas, samples.last().unwrap());
-    let file = ContactRecorder::new(models.path()).unwrap().file().unwrap();
-    let model = Arc::new(ContactModel::read(&file).unwrap());
+    let recorder = ContactRecorder::new(models.path()).unwrap();
+    let model = Arc::new(ContactModel::read(recorder.file()).unwrap());
     let ball = |radius_mm| AnnouncedObject {
         shape: AnnouncedShape::Sphere(Sphere { radius_mm }),
         stiffness_mpa_per_mm: None,
