@@ -29,6 +29,39 @@ fn every_scene_is_read() {
 const REST: &str =
     "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n[motion]\ndepth_mm = 1.0\n";
 
+/// A tetrahedron as an STL file, with edges of 10 and 14 mm if its unit is the metre.
+const TETRAHEDRON: &str = "solid part
+facet normal 0 0 -1
+outer loop
+vertex 0 0 0
+vertex 0 0.01 0
+vertex 0.01 0 0
+endloop
+endfacet
+facet normal 0 -1 0
+outer loop
+vertex 0 0 0
+vertex 0.01 0 0
+vertex 0 0 0.01
+endloop
+endfacet
+facet normal -1 0 0
+outer loop
+vertex 0 0 0
+vertex 0 0 0.01
+vertex 0 0.01 0
+endloop
+endfacet
+facet normal 1 1 1
+outer loop
+vertex 0.01 0 0
+vertex 0 0.01 0
+vertex 0 0 0.01
+endloop
+endfacet
+endsolid part
+";
+
 /// Puts what `whole` has and the example lacks into the example, table by table.
 fn complete(example: &mut Table, whole: &Table) {
     let presses = example.contains_key("pressure");
@@ -57,13 +90,18 @@ fn every_example_in_the_documentation_is_a_scene() {
         |name: &str| std::fs::read_to_string(root().join("docs/reference").join(name)).unwrap();
     let text = read("scenes.md") + &read("indenters.md");
     let rest: Table = toml::from_str(REST).unwrap();
+    // The examples name files, relative to the scene: those of `scenes`, and a body of their own.
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = "two-layer.msh";
+    std::fs::copy(root().join("scenes").join(mesh), folder.path().join(mesh)).unwrap();
+    std::fs::write(folder.path().join("part.stl"), TETRAHEDRON).unwrap();
+    let path = folder.path().join("example.toml");
     let mut seen = 0;
     for block in text.split("```toml\n").skip(1) {
         let example = block.split("```").next().unwrap();
         let mut table: Table = toml::from_str(example).unwrap_or_else(|e| panic!("{e}\n{example}"));
         complete(&mut table, &rest);
         let whole = toml::to_string(&table).unwrap();
-        let path = root().join("scenes/example.toml");
         Scene::parse(&path, whole).unwrap_or_else(|e| panic!("{e}\nin the example\n{example}"));
         seen += 1;
     }

@@ -147,7 +147,7 @@ fn dies_in_the_fourth_press() {
 fn a_killed_campaign_goes_on() {
     let (killed, whole) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let output = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "--ignored", "campaign::tests::dies_in_the_fourth_press"])
+        .args(["--exact", "--ignored", "tests::dies_in_the_fourth_press"])
         .env("PAPILLA_TEST_CAMPAIGN", killed.path())
         .output()
         .unwrap();
