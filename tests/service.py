@@ -1,4 +1,4 @@
-"""What the runs in tests/*/run share: a papilla-server with the shipped models, and a look at it."""
+"""What the runs in tests/*/run share: a papilla-server with the shipped models, a look at it, and at the processor."""
 
 import os
 import subprocess
@@ -36,3 +36,14 @@ def papilla(server: str, *arguments: str, **how) -> subprocess.Popen:
 def resident_kib(pid: int) -> int:
     status = Path(f"/proc/{pid}/status").read_text()
     return int(status.split("VmRSS:")[1].split()[0])
+
+
+def processor_entries() -> dict[str, str]:
+    """What Linux says of the last processor, by name, such as `flags`."""
+    lines = (line.partition(":") for line in Path("/proc/cpuinfo").read_text().splitlines())
+    return {key.strip(): value.strip() for key, _, value in lines}
+
+
+def processor() -> str:
+    """Its name; family and model too, since a virtual machine may name the maker alone."""
+    return "{model name} (family {cpu family}, model {model})".format_map(processor_entries())
