@@ -247,7 +247,7 @@ def tell(sets, perfect, rows):
         medians = [every["sed_relative_l2"], {"median": float(np.median(own))}, every["force_relative"], every["sa1_relative"]]
         return " | ".join(f"{100 * each['median']:.0f} %" for each in medians)
 
-    lines = ["| pitch, noise | SED, all shapes | SED, plates and balls from 6 mm radius | force | SA1 |", "|---|---|---|---|---|"]
+    lines = ["| pitch, noise | SED, all shapes | SED, only plates, and balls of 6 mm radius or more | force | SA1 |", "|---|---|---|---|---|"]
     lines.append(f"| pressure known everywhere | {cells(perfect)} |")
     for row in rows:
         if row["way"] == "smooth":
