@@ -11,8 +11,8 @@
  * Units: mm, N, Pa, J/m3, us. Maps are 224 x 224, row-major, row 0 at the tip of the finger. The
  * finger's frame, the hello and all numbers of an answer: docs/reference/protocol.md.
  *
- * Memory. papilla_session_open takes what frames need. A frame that asks no network (poses in,
- * forces out; nothing touches) allocates nothing; the network runtime allocates for a map.
+ * Memory. papilla_session_open takes what frames need. On Unix a frame asks neither malloc nor the
+ * system for memory, once the first ones were computed (docs/reference/clients/c.md).
  * What an answer points to is the session's, until the next call with that session.
  *
  * Threads. Sessions are independent: one thread each at a time. Calls with one handle must not
