@@ -101,7 +101,7 @@ pub const PARAMETERS: [Parameter; 9] = [
     },
     Parameter {
         key: "crease",
-        name: "rise of the pad to the crease, of what the bone leaves room for",
+        name: "rise of the palmar side from pad to crease, share of the greatest possible",
         low: 0.1,
         high: 0.9,
         start: 0.534,

@@ -12,7 +12,7 @@ impl Verdict {
         match self {
             Self::Ok => "ok".into(),
             Self::Failed => "**failed**".into(),
-            Self::TimesPeople(factor) => format!("{factor:.2} times people's"),
+            Self::TimesPeople(factor) => format!("{factor:.2} times the measured"),
             Self::NotReached(why) => format!("**not reached**: {why}"),
         }
     }
@@ -43,8 +43,8 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "{}{}. {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
-             `coarse`.\n\n## Rows\n\n| quantity | the model | people | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
+            "{}{}. {}. Spheres on the mesh `{}`, plates on `coarse`, both \
+             [graded](../../docs/reference/scenes.md#geometry), unless the table above names the even one.\n\n## Rows\n\n| quantity | the model | measured | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
             HEAD.replace("DENSITY", density(self.density)),
             self.made,
             self.finger_text(),

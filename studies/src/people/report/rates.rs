@@ -43,7 +43,8 @@ pub(super) fn afferents(text: &mut String, found: &Afferents) {
     explained(text, found);
     text.push_str(
         "The table holds SED at the interface. It holds every other stimulus only at one depth: that at \
-         which its R2 of the rates that were not fitted is greatest. All depths are in [human-felt.csv](human-felt.csv), and measured and predicted rates in \
+         which its R2 of the rates that were not fitted is greatest. So the depth was chosen by the rates on which it is \
+         judged, which makes these stimuli look better than they are. All depths are in [human-felt.csv](human-felt.csv), and measured and predicted rates in \
          [human-rates.csv](human-rates.csv).\n\n",
     );
     text.push_str(
@@ -168,9 +169,8 @@ fn explained(text: &mut String, found: &Afferents) {
 /// How far what is felt moves on a finer mesh: the worst of all depths.
 pub(super) fn mesh_errors(text: &mut String, errors: &[MeshError]) {
     text.push_str(
-        "\n## The mesh's own error\n\nThe table says how far a stimulus under the sphere's middle differs from that on the next finer \
-         mesh, at the force with the greatest difference. For each stimulus it holds the depth and the \
-         sphere with the greatest difference. All of them are in \
+        "\n## The mesh's own error\n\nEach stimulus under the sphere's middle is compared with that on the next finer graded mesh. For each \
+         stimulus the table has the force, depth and sphere with the greatest difference. All of them are in \
          [human-mesh.csv](human-mesh.csv).\n\n| stimulus | curvature of the sphere, 1/m | difference |\n|---|---|---|\n",
     );
     for stimulus in Stimulus::ALL {
