@@ -1,20 +1,26 @@
-"""Friction in the loop with MuJoCo: what rests, what is held, what slips."""
+"""Friction in the loop with MuJoCo: what rests, what is held, what slips. And its own tactile sensor."""
 
 import importlib.util
 from pathlib import Path
 
 import pytest
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples/mujoco_hold.py"
+import papilla
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 METHODS = [("second_order", 10.0), ("coarse_pixels", 10.0), ("pixels", 1.0)]
+
+
+def loaded(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture(scope="module")
 def example():
-    spec = importlib.util.spec_from_file_location("mujoco_hold", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return loaded("mujoco_hold")
 
 
 @pytest.mark.parametrize(("method", "hold_s"), METHODS)
@@ -25,3 +31,21 @@ def test_what_friction_holds_stays_until_it_is_pulled_too_hard(example, method, 
     assert found["ripple"] < 5e-3
     assert abs(found["sagged_mm"]) < 0.05 and not found["flagged"]
     assert found["slips_at_share"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_mujocos_sensor_tells_geometry_and_papilla_pressure():
+    example = loaded("mujoco_tactile")
+    finger = papilla.Finger(method="pixels", pressure="vertices")
+    atlas = finger.atlas()
+    found = {}
+    for depth_mm in (0.4, 0.8):
+        found[depth_mm] = example.figures(
+            atlas, example.by_mujoco(atlas, depth_mm), example.by_papilla(finger, depth_mm)
+        )
+        print(depth_mm, found[depth_mm])
+        assert found[depth_mm]["mujoco_depth_max_mm"] == pytest.approx(depth_mm, abs=0.05)
+        assert found[depth_mm]["mujoco_from_geometry_mm"] < 0.05
+        # The skin gives way, so that it touches on less than what lies in the ball at rest.
+        assert 0.0 < found[depth_mm]["papilla_area_mm2"] < found[depth_mm]["mujoco_area_mm2"]
+    # Twice as deep: twice the depth, but far more than twice the force.
+    assert found[0.8]["papilla_force_n"] > 2.3 * found[0.4]["papilla_force_n"]
