@@ -18,7 +18,7 @@ use std::process::ExitCode;
 /// derivatives over load modes. The modes are taken from the training indentations of datasets of
 /// any finger of this template, since their vertices lie at the same (u, v).
 #[derive(clap::Args)]
-#[command(after_help = "Takes 3 min and 3 GB; the atlas alone some seconds.\n\
+#[command(after_help = "Takes 1.4 min of a core and 0.8 GB; the atlas alone some seconds.\n\
                         Example: fe-datagen finger build fingers/mine")]
 pub(super) struct Args {
     /// Folder of the finger.
