@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
+import { readMesh } from '../src/meshes.js';
 import { launch, openPage } from './browser.js';
 import { PATIENCE_MS, lower, nextAnswer, onScreen, openHeadset, openScene, shot, until } from './scene.js';
 
@@ -30,6 +31,26 @@ test('the code of the page tells what pushes back', async () => {
   const words = (await said).text();
   const forceN = Number(words.match(/^pushes back with ([0-9.e-]+) N$/)?.[1]);
   assert.ok(forceN > 0.01 && forceN < 1, words);
+  await page.close();
+});
+
+test('a mesh from a file presses like the ball that it holds', async () => {
+  const file = await readFile(new URL('meshes/ball.stl', import.meta.url));
+  const mesh = await readMesh(file.buffer.slice(file.byteOffset, file.byteOffset + file.byteLength), 'ball.stl');
+  const page = await openPage(browser);
+  const forces = await page.evaluate(async (shapes) => {
+    const { Hand } = await import(/** @type {any} */ ('/client/papilla.js'));
+    const found = [];
+    for (const shape of shapes) {
+      const hand = await Hand.connect('', { objects: [{ shape }] });
+      const { touch } = await hand.touch([{ at: [11.25, 0, -6.53 - 6 + 0.5], turn: [0, 0, 0, 1] }]);
+      found.push(touch.forceN[2]);
+      hand.close();
+    }
+    return found;
+  }, [mesh, { shape: 'sphere', radius_mm: 6 }]);
+  // Its facets lie in the ball, up to .1 mm below its surface.
+  assert.ok(forces[0] < forces[1] && forces[0] > 0.7 * forces[1], `${forces} N`);
   await page.close();
 });
 
