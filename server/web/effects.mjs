@@ -2,6 +2,7 @@
 // of a frame goes. What is not switched on is not computed: the frame's own timings show it.
 
 import { digits } from './colour.mjs';
+import { byId, put } from './notice.mjs';
 import { Times, keep, median, msOf } from './times.mjs';
 import { EFFECTS } from './words.mjs';
 
@@ -13,10 +14,9 @@ const PARTS = [['wait', 'waited for a thread'], ['solve', 'contact'], ['infer', 
 const REST = { bare: 'checks and sending', more: 'effects, checks and sending' };
 /** Where the electrodes of the example are, px. */
 const GRID = [80, 101, 122, 143];
+const OFF = 'off';
 /** These exclude each other (docs/reference/protocol-effects.md). */
 const EXCLUDES = { relaxation: 'shear_energy', shear_energy: 'relaxation' };
-
-const byId = (id) => document.getElementById(id);
 
 /** The last answers under the same terms. */
 class Recent {
@@ -96,7 +96,8 @@ export class EffectSwitches {
     row.append(head);
     row.insertCell().textContent = costUs === null ? '–' : msOf(costUs);
     const now = row.insertCell();
-    this.rows.set(name, { box, now });
+    now.textContent = OFF;
+    this.rows.set(name, { box, now, costUs });
     box.addEventListener('change', () => {
       this.set(name, box.checked);
       changed(name, box.checked);
@@ -116,7 +117,7 @@ export class EffectSwitches {
     if (on) this.on.add(name);
     else this.on.delete(name);
     if (on && EXCLUDES[name] && this.on.has(EXCLUDES[name])) this.set(EXCLUDES[name], false);
-    if (!on) row.now.textContent = '';
+    if (!on) row.now.textContent = OFF;
   }
 
   /** Whether a switch can be moved: what cannot be had is not offered. */
@@ -167,17 +168,17 @@ export class EffectSwitches {
 
   /** What each effect brought with this answer. */
   #results(answer) {
-    const put = (name, text) => {
+    const bring = (name, text) => {
       const row = this.rows.get(name);
       if (row && this.on.has(name) && row.now.textContent !== text) row.now.textContent = text;
     };
-    if (answer.ratesHz) put('afferents', `fastest ${answer.ratesHz.reduce((a, b) => Math.max(a, b), 0).toFixed(0)} Hz`);
-    if (answer.spikes) put('spikes', `${answer.spikes.count} in this answer, plotted below`);
-    if (answer.summary) put('summary', `${answer.summary[0].toFixed(2)} N on ${answer.summary[1].toFixed(0)} mm²`);
-    if (answer.points) put('points', `${digits(answer.points[0])} J/m³`);
+    if (answer.ratesHz) bring('afferents', `fastest ${answer.ratesHz.reduce((a, b) => Math.max(a, b), 0).toFixed(0)} Hz`);
+    if (answer.spikes) bring('spikes', `${answer.spikes.count} in this answer, plotted below`);
+    if (answer.summary) bring('summary', `${answer.summary[0].toFixed(2)} N on ${answer.summary[1].toFixed(0)} mm²`);
+    if (answer.points) bring('points', `${digits(answer.points[0])} J/m³`);
     if (answer.actuators) this.#electrodes(answer.actuators);
-    if (this.on.has('contact_window')) put('contact_window', `${(answer.bytes / 1024).toFixed(0)} KiB an answer`);
-    for (const name of ['relaxation', 'shear_energy']) put(name, `peak of SED ${digits(median(this.recent.peak))} J/m³`);
+    if (this.on.has('contact_window')) bring('contact_window', `${(answer.bytes / 1024).toFixed(0)} KiB an answer`);
+    for (const name of ['relaxation', 'shear_energy']) bring(name, `peak of SED ${digits(median(this.recent.peak))} J/m³`);
   }
 
   /** The intensities of the electrodes, one square each, as they lie on the pad. */
@@ -198,6 +199,13 @@ export class EffectSwitches {
     intensities.forEach((x, k) => { box.children[k].style.opacity = String(0.08 + 0.92 * Math.min(1, x)); });
   }
 
+  /** What those that are on cost together, as the service lists them. */
+  #listedUs() {
+    let sum = 0;
+    for (const name of this.on) sum += this.rows.get(name)?.costUs ?? 0;
+    return sum;
+  }
+
   #changes() {
     const { recent, before } = this;
     const note = byId('effects-note');
@@ -209,6 +217,7 @@ export class EffectSwitches {
       if (recent.bytes !== before.bytes) parts.push(`an answer ${(before.bytes / 1024).toFixed(0)} to ${(recent.bytes / 1024).toFixed(0)} KiB`);
       this.said = `${parts.join('; ')}.`;
     }
+    put('tab-effects', this.on.size === 0 ? 'none on, 0 ms' : `${this.on.size} on, ${msOf(this.#listedUs())} ms`);
     const text = this.said || (this.on.size === 0 ? 'Nothing is named, so no effect is in memory and none takes time.' : '');
     if (note.textContent !== text) note.textContent = text;
   }

@@ -4,19 +4,30 @@ import { meshOf } from './mesh.mjs';
 import { byId } from './notice.mjs';
 import { save } from './share.mjs';
 
-/** A file whose size could be a finger's keeps it. */
+/** A file whose size could be a finger's keeps it; one that has such a size in metres is taken in metres. */
 const PLAUSIBLE_MM = { least: 3, most: 30 };
 const OTHERWISE_MM = 10;
+const MM_PER_M = 1000;
+
+const isPlausible = (mm) => mm >= PLAUSIBLE_MM.least && mm <= PLAUSIBLE_MM.most;
+
+/** The greatest side that a mesh is given, mm, and why, in words. */
+export function sizeFor(sideMm) {
+  const own = Number(sideMm.toFixed(2));
+  if (isPlausible(sideMm)) return [own, 'its own size'];
+  const inMetres = Number((sideMm * MM_PER_M).toFixed(2));
+  if (isPlausible(inMetres)) return [inMetres, `${sideMm.toPrecision(3)} long in the file: taken as metres, ${inMetres} mm`];
+  return [OTHERWISE_MM, `${sideMm.toPrecision(3)} mm in the file, made ${OTHERWISE_MM} mm`];
+}
 
 /** Takes files that are dropped on the page or opened: `take(mesh, sizeMm)` gets their mesh, `complain` what is wrong with them. */
 export function listenToMeshes(take, complain, hasMesh) {
   const read = async (file) => {
     try {
       const mesh = meshOf(await file.arrayBuffer(), file.name);
-      const own = Number(mesh.sideMm.toFixed(2));
-      const size = mesh.sideMm >= PLAUSIBLE_MM.least && mesh.sideMm <= PLAUSIBLE_MM.most ? own : OTHERWISE_MM;
+      const [size, why] = sizeFor(mesh.sideMm);
       take(mesh, size);
-      byId('mesh-note').textContent = `${file.name}: ${mesh.triangles.length} triangles; ${size === own ? 'its own size' : `${mesh.sideMm.toPrecision(3)} mm in the file, made ${size} mm`}. Its side towards +z presses.`;
+      byId('mesh-note').textContent = `${[`${file.name}: ${mesh.given} triangles`, why, ...mesh.said].join('; ')}. Its side towards +z presses.`;
     } catch (error) {
       complain(error.message);
     }

@@ -1,20 +1,21 @@
 // Hard cases: each is sent to this server in a session of its own, and shown with what came back. Beside
-// them what the finite-element code does with its own (docs/reports/stability.md).
+// each stands what the finite-element code does with a difficulty of the kind (beside.mjs).
 
+import { HardCasesOfFe } from './beside.mjs';
 import { poseOf } from './contact.mjs';
 import { TABLES, TABLE_LEN, digits } from './colour.mjs';
+import { byId, put } from './notice.mjs';
 import { Press } from './press.mjs';
 import { MAP_LEN, SIDE_PX, Session, sessionUrl } from './protocol.mjs';
-import { fetchJson } from './replay.mjs';
 import { fadeInto, groundOf } from './scale.mjs';
 import { flagsOf } from './words.mjs';
 
 const PATIENCE_MS = 30000;
 const KPA = 1000;
+/** What came of the last one, in short. */
+const TOLD = { refused: 'refused, with why', flagged: 'answered, flagged', plain: 'answered' };
 /** Red, so that one such pixel is seen. */
 const NAN_COLOUR = 0xff0000ff;
-
-const byId = (id) => document.getElementById(id);
 
 /** Pressure of a round contact in the middle of the pad, Pa. */
 function roundContact(peakPa, radiusPx) {
@@ -44,36 +45,46 @@ const objects = (list) => ({ input: 'objects', pressure: 'map', objects: list })
 /**
  * The cases. `make(atlas, mostPa)` gives the terms and the frames: maps of pressure or poses, the last of
  * which is the case. `needsContact`: its frames are poses, which only a server with a contact model takes.
+ * `beside`: cases of the finite-element code (stability.json) that are hard in the same way, of which variants
+ * `like` this come first, and `why`.
  */
 export const CASES = [
-  { name: 'Checkerboard', sent: '20 kPa on every other pixel: no skin presses like that', make: () => ({
+  { name: 'Checkerboard', sent: '20 kPa on every other pixel: no skin presses like that',
+    beside: ['incompressible'], why: 'a pressure that alternates from element to element is how elements fail on tissue that keeps its volume', make: () => ({
     terms: {}, frames: [Float32Array.from({ length: MAP_LEN }, (_, i) => ((Math.floor(i / SIDE_PX) + (i % SIDE_PX)) % 2 ? 20 * KPA : 0))],
   }) },
-  { name: 'Not a number', sent: 'a contact of 10 kPa with one pixel that is NaN', make: () => {
+  { name: 'Not a number', sent: 'a contact of 10 kPa with one pixel that is NaN',
+    beside: ['relaxation-times', 'ogden'], like: /NaN|infinite/, why: 'numbers that are not finite, in a material', make: () => {
     const map = roundContact(10 * KPA, 24);
     map[105 * SIDE_PX + 112] = NaN;
     return { terms: {}, frames: [map] };
   } },
-  { name: 'Ten times the range', sent: 'ten times the greatest pressure of the training', make: (_, mostPa) => ({ terms: {}, frames: [roundContact(10 * mostPa, 24)] }) },
-  { name: 'Blade', sent: 'a blade of 0.05 mm, 2 mm deep', needsContact: true, make: (atlas) => {
+  { name: 'Ten times the range', sent: 'ten times the greatest pressure of the training',
+    beside: ['volume', 'ogden'], why: 'strains far beyond those that a material was fitted to', make: (_, mostPa) => ({ terms: {}, frames: [roundContact(10 * mostPa, 24)] }) },
+  { name: 'Blade', sent: 'a blade of 0.05 mm, 2 mm deep',
+    beside: ['sharp-wedge'], why: 'an edge that is finer than the mesh', needsContact: true, make: (atlas) => {
     const { objects: list, pose } = pressed(atlas, 'wedge', 1, 2);
     return { terms: objects(list), frames: [pose] };
   } },
-  { name: 'Jump of 10 mm', sent: 'a ball 8.5 mm off the skin, and in the next frame 1.5 mm deep', needsContact: true, make: (atlas) => {
+  { name: 'Jump of 10 mm', sent: 'a ball 8.5 mm off the skin, and in the next frame 1.5 mm deep',
+    beside: ['one-increment', 'first-gap'], why: 'the whole way in one step, and a start far off', needsContact: true, make: (atlas) => {
     const { objects: list, pose } = pressed(atlas, 'sphere', 5, 1.5);
     const off = pressed(atlas, 'sphere', 5, -8.5).pose;
     return { terms: objects(list), frames: [off, pose] };
   } },
-  { name: 'Off the edge', sent: 'a plate 1.5 mm deep where the map of the finger ends', needsContact: true, make: (atlas) => {
+  { name: 'Off the edge', sent: 'a plate 1.5 mm deep where the map of the finger ends',
+    beside: ['grazing'], why: 'contact at the last nodes of a surface', needsContact: true, make: (atlas) => {
     const { objects: list, pose } = pressed(atlas, 'plate', 0, 1.5, [112, 200]);
     return { terms: objects(list), frames: [pose] };
   } },
-  { name: 'No rotation', sent: 'a pose whose quaternion has length 2', needsContact: true, make: (atlas) => {
+  { name: 'No rotation', sent: 'a pose whose quaternion has length 2',
+    beside: ['mesh-files', 'free-modes'], why: 'input that is no body, and bodies that nothing holds', needsContact: true, make: (atlas) => {
     const { objects: list, pose } = pressed(atlas, 'sphere', 5, 1);
     for (let k = 3; k < 7; k++) pose[k] *= 2;
     return { terms: objects(list), frames: [pose] };
   } },
-  { name: 'Metres for mm', sent: 'a ball of 0.01 mm: its radius of 10 mm, given in m', needsContact: true, make: (atlas) => {
+  { name: 'Metres for mm', sent: 'a ball of 0.01 mm: its radius of 10 mm, given in m',
+    beside: ['units'], like: /in m$/, why: 'a value in another unit', needsContact: true, make: (atlas) => {
     const { pose } = pressed(atlas, 'sphere', 5, 1);
     return { terms: objects([{ shape: { shape: 'sphere', radius_mm: 0.01 } }]), frames: [pose] };
   } },
@@ -168,7 +179,8 @@ export class HardCases {
       return button;
     });
     byId('hard-cases').append(...this.buttons);
-    for (const input of document.querySelectorAll('input[name=hard]')) input.addEventListener('change', () => this.#tab(input.value));
+    this.fe = new HardCasesOfFe();
+    put('tab-hard', `${list.length} to send`);
   }
 
   /** Shows the first case without being asked, so that there is something to see. */
@@ -181,6 +193,7 @@ export class HardCases {
     const box = byId('hard-case');
     const mine = {};
     this.running = mine;
+    this.fe.show(hardCase);
     box.dataset.state = 'sent';
     const tier = this.tierFor(hardCase.needsContact ? 'poses' : 'pressure');
     const mostPa = tier?.pressure_max_pa ?? NaN;
@@ -216,39 +229,7 @@ export class HardCases {
       line('in', `${(answer.serverUs / 1000).toFixed(1)} ms`);
     }
     box.replaceChildren(pictures, list);
+    put('tab-hard', TOLD[verdict.kind]);
     box.dataset.state = verdict.kind;
   }
-
-  async #tab(name) {
-    byId('hard-live').hidden = name !== 'live';
-    byId('hard-fe').hidden = name !== 'fe';
-    if (name !== 'fe' || byId('hard-fe').childElementCount > 0) return;
-    const { summary, cases } = await fetchJson('stability.json');
-    const about = document.createElement('p');
-    about.className = 'hint';
-    about.textContent = `${summary} Converged: the solver found an equilibrium, which was then checked. Evaluated: a formula was computed and checked; nothing is solved. Refused: an error names the cause, and no answer is given.`;
-    byId('hard-fe').append(about, ...cases.map(feCase));
-  }
-}
-
-function feCase({ name, about, variants }) {
-  const box = document.createElement('details');
-  const head = document.createElement('summary');
-  const code = document.createElement('b');
-  code.textContent = `${name[0].toUpperCase()}${name.slice(1).replaceAll('-', ' ')}:`;
-  const count = (word) => variants.filter(([, end]) => end === word).length;
-  const counts = ['converged', 'evaluated', 'refused'].map((word) => [count(word), word]).filter(([n]) => n > 0);
-  head.append(code, ` ${counts.map(([n, word]) => `${n} ${word}`).join(', ')}`);
-  const text = document.createElement('p');
-  text.textContent = about;
-  const table = document.createElement('table');
-  const heads = table.createTHead().insertRow();
-  for (const word of ['variant', 'outcome', 'what was checked: found, and allowed']) heads.append(Object.assign(document.createElement('th'), { scope: 'col', textContent: word }));
-  table.createTBody();
-  for (const [variant, end, more] of variants) {
-    const row = table.tBodies[0].insertRow();
-    for (const words of [variant, end, more]) row.insertCell().textContent = words;
-  }
-  box.append(head, text, table);
-  return box;
 }

@@ -15,6 +15,7 @@ export function indenterMesh({ shape, sizeMm, body }) {
   if (shape === 'plate') box(vertices);
   else if (shape === 'sphere') sphere(vertices, sizeMm);
   else if (shape === 'cylinder') bar(vertices, sizeMm);
+  else if (shape === 'mesh') facets(vertices, body);
   else return surfaceMesh(body);
   return Float32Array.from(vertices);
 }
@@ -35,6 +36,17 @@ export function arrowMesh() {
     }
   }
   return Float32Array.from(vertices);
+}
+
+/** A mesh as it is, turned about x so that its side towards +z comes down on the finger. */
+function facets(out, { hello, faceMm }) {
+  for (const triangle of hello.triangles) {
+    const [a, b, c] = triangle.map((k) => hello.vertices_mm[k]).map(([x, y, z]) => [x, -y, faceMm - z]);
+    const [u, v] = [b, c].map((corner) => corner.map((x, axis) => x - a[axis]));
+    const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    const length = Math.hypot(...normal) || 1;
+    for (const corner of [a, b, c]) out.push(...corner, ...normal.map((x) => x / length));
+  }
 }
 
 function quad(out, corners, normals) {

@@ -1,6 +1,7 @@
 // The ladder: error against time of every rung, the running one marked; a click on a rung switches to it.
 // Times of rungs that this server serves are its own calibration, the others' are those shipped.
 
+import { byId, put } from './notice.mjs';
 import { fetchJson } from './replay.mjs';
 import { choosable, errorFrom, setFor, suits } from './tiers.mjs';
 import { aboutMethod, aboutSet, aboutTier, nameOfMethod, nameOfOthers, nameOfSet, nameOfTier } from './words.mjs';
@@ -14,8 +15,6 @@ const TICK_PX = 46;
 const KINDS = {
   closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'published U-Net', fe: 'finite elements (FE)',
 };
-
-const byId = (id) => document.getElementById(id);
 
 /** Two significant digits without needless zeros. */
 export function short(value) {
@@ -368,6 +367,7 @@ export class LadderView {
     if (serverMs > 0) parts.push(`now ${showTime(serverMs)} in the server${this.ready?.method ? ' with contact' : ''}`);
     if (error > 0) parts.push(`${showError(error)} on this frame`);
     if (this.ready?.meets_budget === false) parts.push('not expected to meet the budget');
+    put('tab-ladder', rung ? `${serverMs > 0 ? showTime(serverMs) : '–'}, ${showError(error > 0 ? error : rung.error)} off` : '–');
     const text = parts.join('; ');
     if (byId('ladder-now').textContent !== text) byId('ladder-now').textContent = text;
   }

@@ -8,6 +8,8 @@ import { onTheme } from './theme.mjs';
 
 const BAR_LENGTHS_MM = [10, 5, 2, 1];
 const TIP = 'tip \u2191';
+/** A smaller map stands beside one that says it. */
+const TIP_FROM_PX = 130;
 /** A scale has to hold this share of the pixels that hold anything: one bright line does not take it. */
 const PART = 0.98;
 
@@ -164,13 +166,15 @@ export class MapView {
     context.lineWidth = 1.25 * px;
     context.strokeStyle = theme.outline;
     context.stroke(this.outline);
-    context.font = `${11 * px}px system-ui, sans-serif`;
-    context.textAlign = 'right';
-    context.lineWidth = 3 * px;
-    context.strokeStyle = theme.panel;
-    context.strokeText(TIP, SIDE_PX - 2 * px, 11 * px);
-    context.fillStyle = theme.muted;
-    context.fillText(TIP, SIDE_PX - 2 * px, 11 * px);
+    if (overlay.clientWidth >= TIP_FROM_PX) {
+      context.font = `${11 * px}px system-ui, sans-serif`;
+      context.textAlign = 'right';
+      context.lineWidth = 3 * px;
+      context.strokeStyle = theme.panel;
+      context.strokeText(TIP, SIDE_PX - 2 * px, 11 * px);
+      context.fillStyle = theme.muted;
+      context.fillText(TIP, SIDE_PX - 2 * px, 11 * px);
+    }
     if (this.marker) {
       drawMarker(context, this.marker, px, 'rgb(0 0 0 / 0.55)', 3.5);
       drawMarker(context, this.marker, px, 'rgb(255 255 255 / 0.95)', 1.5);

@@ -1,4 +1,7 @@
-// A visitor's own STL or GLB as the service takes meshes: vertices in mm, triangles that share them.
+// A visitor's own STL or GLB as the service takes meshes: vertices in mm, triangles that share them and
+// bound a body.
+
+import { mended } from './mend.mjs';
 
 const MOST_TRIANGLES = 16384;
 const GLB_MAGIC = 0x46546c67;
@@ -13,7 +16,7 @@ const STL_FACET = 50;
 /** Corners closer than this share of the greatest side are one vertex. */
 const WELD = 1e-5;
 
-/** The mesh in a file: vertices in mm about the middle of their box, triangles. Throws an Error that says what is wrong with it. */
+/** The mesh in a file: vertices in mm about the middle of their box, triangles, and what was mended. Throws an Error that says what is wrong with it. */
 export function meshOf(buffer, name) {
   const view = new DataView(buffer);
   const isGlb = buffer.byteLength >= 12 && view.getUint32(0, true) === GLB_MAGIC;
@@ -23,7 +26,11 @@ export function meshOf(buffer, name) {
   const count = corners.length / 9;
   if (count > MOST_TRIANGLES) throw new Error(`${name} has ${count} triangles; a mesh may have ${MOST_TRIANGLES} at most: reduce it first`);
   if (corners.some((x) => !Number.isFinite(x))) throw new Error(`${name} holds a coordinate that is not finite`);
-  return { name, ...welded(corners) };
+  const mesh = mended({ name, ...welded(corners) });
+  if (mesh.triangles.length > MOST_TRIANGLES) throw new Error(`${name} has holes, and closed it would have ${mesh.triangles.length} triangles; a mesh may have ${MOST_TRIANGLES} at most: reduce it first`);
+  const flat = count - mesh.given;
+  if (flat > 0) mesh.said.unshift(`${flat} ${flat === 1 ? 'triangle' : 'triangles'} without area left out`);
+  return mesh;
 }
 
 function cornersOfStl(buffer, view) {
@@ -142,5 +149,5 @@ function welded(corners) {
     const [a, b, c] = [indexOf(k), indexOf(k + 3), indexOf(k + 6)];
     if (a !== b && b !== c && c !== a) triangles.push([a, b, c]);
   }
-  return { vertices_mm: vertices, triangles, sideMm: side };
+  return { vertices_mm: vertices, triangles, given: triangles.length, sideMm: side };
 }

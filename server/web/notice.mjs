@@ -11,6 +11,13 @@ export function put(id, text) {
   if (byId(id).textContent !== text) byId(id).textContent = text;
 }
 
+/** Writes what is always read, and what is read where there is room. */
+export function putParts(id, [text, more]) {
+  const [first, second] = byId(id).children;
+  if (first.textContent !== text) first.textContent = text;
+  if (second.textContent !== more) second.textContent = more;
+}
+
 export function showState(state, detail) {
   const { [state]: word } = STATES;
   byId('state').dataset.state = state;

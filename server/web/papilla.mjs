@@ -12,7 +12,7 @@ import { HardCases } from './hard.mjs';
 import { LadderView, adviseTier, listTiers, offerTiers } from './ladder.mjs';
 import { differencesFromServer } from './mask.mjs';
 import { Meters } from './meters.mjs';
-import { byId, forgetNotice, notify, put, showFlags, showState } from './notice.mjs';
+import { byId, forgetNotice, notify, putParts, showFlags, showState } from './notice.mjs';
 import { Pictures, equal } from './pictures.mjs';
 import { Press } from './press.mjs';
 import { MAP_LEN, SIDE_PX, Session, sessionUrl } from './protocol.mjs';
@@ -272,7 +272,7 @@ class Page {
       this.repaint = false;
     }
     this.effects.answer(answer, this.pictures.views.sed.peak, nowMs);
-    put('sed-ms', this.effects.recent.times.words);
+    putParts('sed-ms', this.effects.recent.times.words);
     const forceN = touch?.forceN ?? (this.sent.mode === 'press' ? this.press.forceN : NaN);
     const rateHz = answer.ratesHz ? answer.ratesHz.reduce((a, b) => Math.max(a, b), 0) : NaN;
     this.timeline.add(nowMs, forceN, this.pictures.views.sed.peak, rateHz, this.sent.pressed, answer.serverUs / 1000);
@@ -316,7 +316,7 @@ class Page {
     if (this.mode !== 'press') return;
     const { ready } = this.comparison.session ?? {};
     this.pictures.sure.other.show(answer.noContact ? null : answer.errorEstimate, NaN, this.#whyUnknown(ready?.tier));
-    put('other-ms', this.comparison.times.words);
+    putParts('other-ms', this.comparison.times.words);
     this.pictures.showPair(first, second, this.comparison.with, answer, ready?.pressure_max_pa);
   }
 

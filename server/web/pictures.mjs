@@ -3,7 +3,7 @@
 import { relativeL2 } from './compare.mjs';
 import { FingerView } from './finger.mjs';
 import { MapView } from './map.mjs';
-import { byId, put, showFlags } from './notice.mjs';
+import { byId, put, putParts, showFlags } from './notice.mjs';
 import { MAP_LEN } from './protocol.mjs';
 import { LOG_DECADES, Scale } from './scale.mjs';
 import { SureBar } from './sure.mjs';
@@ -61,7 +61,7 @@ export class Pictures {
   showTruth({ truth, difference, figures }, estimate, nowMs) {
     this.views.other.show(truth, nowMs);
     this.views.difference.show(difference, nowMs);
-    put('other-ms', 'solved once, before');
+    putParts('other-ms', ['solved before', '']);
     this.sure.sed.show(estimate, figures.relativeL2);
     this.sure.other.show(null);
     showFlags('other-flags', []);

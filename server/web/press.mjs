@@ -68,11 +68,9 @@ export class Press {
 
   /** Changes shape (a name of `SHAPES`), its size, its direction and its lean; `mesh` is one's own. */
   setShape(shape, sizeMm, angleRad, tiltRad = this.tiltRad, mesh = undefined) {
-    const key = `${shape} ${sizeMm} ${mesh?.name}`;
-    if (key !== this.bodyKey) {
-      this.body = SHAPES[shape].make(sizeMm, mesh);
-      this.bodyKey = key;
-    }
+    // Two files may have one name.
+    if (shape !== this.shape || sizeMm !== this.sizeMm || mesh !== this.mesh) this.body = SHAPES[shape].make(sizeMm, mesh);
+    this.mesh = mesh;
     this.shape = shape;
     this.sizeMm = sizeMm;
     this.angleRad = angleRad;

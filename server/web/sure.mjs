@@ -18,6 +18,12 @@ export function sureWords(estimate, unknown = UNKNOWN) {
   return `expected error ${percent(typical)}${most}`;
 }
 
+/** The same where there is little room. */
+function sureWord(estimate, found) {
+  if (!Number.isFinite(estimate[0])) return 'error unknown';
+  return `error ${percent(found > 0 ? found : estimate[0])}`;
+}
+
 export class SureBar {
   /** `element` gets the bar and its words. */
   constructor(element) {
@@ -28,8 +34,9 @@ export class SureBar {
     this.typical = document.createElement('b');
     this.found = document.createElement('u');
     this.bar.append(this.bound, this.typical, this.found);
-    this.text = document.createElement('span');
-    element.replaceChildren(this.bar, this.text);
+    this.text = Object.assign(document.createElement('span'), { className: 'wide' });
+    this.word = Object.assign(document.createElement('span'), { className: 'narrow' });
+    element.replaceChildren(this.bar, this.text, this.word);
     element.title = 'Relative L2 error of SED against finite elements, as the service expects it of this answer. The bar ends at 50 %.';
   }
 
@@ -41,6 +48,7 @@ export class SureBar {
     this.text.textContent = shown;
     this.element.hidden = shown === '';
     if (!estimate) return;
+    this.word.textContent = sureWord(estimate, found);
     const [typical, bound] = estimate;
     this.bar.hidden = !Number.isFinite(typical);
     this.typical.style.width = part(typical);

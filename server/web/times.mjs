@@ -40,10 +40,10 @@ export class Times {
     return this.of('solve') + this.of('infer') + this.of('rest');
   }
 
-  /** The work and its two great parts. */
+  /** The work, and its two great parts. */
   get words() {
-    if (this.parts.infer.length === 0) return '–';
+    if (this.parts.infer.length === 0) return ['–', ''];
     const contact = this.of('solve') > 0 ? `contact ${msOf(this.of('solve'))}, ` : '';
-    return `${msOf(this.workUs)} ms: ${contact}network ${msOf(this.of('infer'))}`;
+    return [`${msOf(this.workUs)} ms`, `${contact}network ${msOf(this.of('infer'))}`];
   }
 }

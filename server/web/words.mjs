@@ -5,9 +5,9 @@ import { suits } from './tiers.mjs';
 /** Sets of simulations that models are judged on (models/ladder.json). */
 const SETS = {
   reference: ['finest mesh', 'the only set that finite elements on coarser meshes were held against'],
-  'reference-anew': ['finest mesh, new poses', 'solved when everything was decided'],
-  'heldout-presses': ['new presses, known shapes', 'for maps of pressure the service chooses by these'],
-  'heldout-shapes': ['shapes never trained on', ''],
+  'reference-anew': ['finest mesh again', 'other poses, solved when everything was decided'],
+  'heldout-presses': ['new presses', 'of shapes that were trained on; for maps of pressure the service chooses by these'],
+  'heldout-shapes': ['new shapes', 'never trained on'],
   pressed: ['hard presses', 'a plate to 7 N, a key, gratings, Braille'],
   s1: ['a flat plate', 'as in the paper of the published U-Net'],
   poses: ['from poses', 'for poses the service chooses by these; what contact takes comes on top of the times shown'],

@@ -51,7 +51,9 @@ test('the page breaks no rule of accessibility, in any mode, in both colours, wi
       found.push(...await broken(page, `${mode}, ${where}`));
     }
     await page.evaluate(() => { document.getElementById('more').open = true; });
-    await page.check('input[name=hard][value=fe]', { force: true });
+    // A phone shows one of the three at a time.
+    if (viewport === PHONE) await page.check('input[name=promise][value=hard]', { force: true });
+    await page.locator('#hard-all > summary').click();
     await page.waitForSelector('#hard-fe details');
     await page.locator('#hard-fe summary').first().click();
     found.push(...await broken(page, `all unfolded, ${where}`));

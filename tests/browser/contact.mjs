@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
 import { BASE, largest, launch, placeOfPeak } from './browser.mjs';
+import { dome, glbOf, stlOf } from './meshes.mjs';
 
 const PATIENCE_MS = 90000;
 let browser;
@@ -161,7 +162,7 @@ test('the finger is drawn as the service moved it: out of the object, and round 
 });
 
 test('an answer says how wrong it is likely to be, where that is known', async () => {
-  const said = (pattern, id = 'sed-sure') => until(([source, of]) => new RegExp(source, 'u').test(document.getElementById(of).textContent), [pattern.source, id]);
+  const said = (pattern, id = 'sed-sure') => until(([source, of]) => new RegExp(source, 'u').test(document.querySelector(`#${of} .wide`).textContent), [pattern.source, id]);
   await chooseRadio('shape', 'sphere');
   await page.fill('#size', '8');
   await page.fill('#depth', '1');
@@ -279,7 +280,7 @@ test('a second model answers the same contact, and the difference is of that pai
 
 test('the second answer is found from poses as the first one is, and states the error of its own way', async () => {
   /** The errors that an answer states, %. */
-  const stated = async (id) => (await page.locator(`#${id}`).textContent()).match(/[\d.]+(?= %)/g)?.map(Number) ?? [];
+  const stated = async (id) => (await page.locator(`#${id} .wide`).textContent()).match(/[\d.]+(?= %)/g)?.map(Number) ?? [];
   const comparedBy = (tier, method) => until((due) => {
     const { ready } = globalThis.papilla.comparison.session ?? {};
     return ready?.tier === due[0] && ready.method === due[1] && globalThis.papilla.session.ready?.method === due[1];
@@ -290,12 +291,12 @@ test('the second answer is found from poses as the first one is, and states the 
   await page.selectOption('#tier', 'nano');
   await page.selectOption('#with', 'tier:small');
   await comparedBy('small', 'pixels');
-  await until(() => /^expected error \d/.test(document.getElementById('other-sure').textContent));
+  await until(() => /^expected error \d/.test(document.querySelector('#other-sure .wide').textContent));
   await settled();
   const second = await stated('other-sure');
   assert.equal(second.length, 2);
   second.forEach((error, k) => assert.ok(Math.abs(error - alone[k]) <= 0.1 + 0.01 * alone[k], `${second} %, alone ${alone} %`));
-  assert.match(await page.locator('#sed-ms').textContent(), /^[\d.]+ ms: contact [\d.]+, network [\d.]+$/);
+  assert.match(await page.locator('#sed-ms').innerText(), /^[\d.]+ ms\ncontact [\d.]+, network [\d.]+$/);
   // What is not compared follows the first answer.
   await page.selectOption('#method', 'springs');
   await comparedBy('small', 'springs');
@@ -306,7 +307,7 @@ test('the second answer is found from poses as the first one is, and states the 
   await until(() => globalThis.papilla.comparison.session.ready?.tier === 'large');
   // A network that did not learn the pressure of contact states no error, and the page says why.
   await page.selectOption('#with', 'tier:small-maps');
-  await until(() => /unknown, as it learnt maps of pressure$/.test(document.getElementById('other-sure').textContent));
+  await until(() => /unknown, as it learnt maps of pressure$/.test(document.querySelector('#other-sure .wide').textContent));
   await page.selectOption('#with', '');
   await page.selectOption('#tier', 'nano');
   await settled();
@@ -374,7 +375,7 @@ test('friction that came with the switch of shear goes with it, and the second a
   await page.selectOption('#with', 'tier:small');
   await page.check('#effect-shear_energy');
   await until(() => globalThis.papilla.comparison.session.ready?.session_effects.includes('shear_energy'));
-  await until(() => /unknown with friction or creep$/.test(document.getElementById('other-sure').textContent));
+  await until(() => /unknown with friction or creep$/.test(document.querySelector('#other-sure .wide').textContent));
   assert.equal(await page.locator('#friction-out').textContent(), '0.50');
   await page.uncheck('#effect-shear_energy');
   assert.equal(await page.locator('#friction-out').textContent(), 'none');
@@ -433,28 +434,69 @@ test('every hard case is refused or flagged, or answered without a fault', async
     const said = await page.locator('#hard-case').innerText();
     assert.doesNotMatch(said, /NOT finite/);
     if (kind === 'refused') assert.match(said, /Refused with the error (not_finite|bad_contact)/);
+    // Beside it, what finite elements do with a difficulty of the kind.
+    const beside = await page.locator('#hard-beside').innerText();
+    assert.match(beside, /converge|are evaluated|stop with an error/, name);
+    if (name === 'Metres for mm') assert.match(beside, /moduli are in MPa, was k?Pa meant\?/);
+    if (name === 'Blade') assert.match(beside, /Sharp wedge: \d+ converge, \d+ stop with an error/);
   }
-  await page.check('input[name=hard][value=fe]', { force: true });
+  await page.locator('#hard-all > summary').click();
   await until(() => document.querySelectorAll('#hard-fe details').length > 15);
   assert.match(await page.locator('#hard-fe').innerText(), /\d+ variants of \d+ cases/);
-  await page.check('input[name=hard][value=live]', { force: true });
+  await page.locator('#hard-all > summary').click();
 });
 
-test('a file dropped on the page presses', async () => {
-  await page.evaluate(() => {
-    const corners = [[0, 0, 0], [6, 0, 0], [0, 6, 0], [0, 0, 6]];
-    const faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-    const text = `solid x\n${faces.map((face) => `facet outer loop ${face.map((k) => `vertex ${corners[k].join(' ')}`).join(' ')} endloop endfacet`).join('\n')}`;
-    const drop = new DataTransfer();
-    drop.items.add(new File([text], 'corner.stl'));
-    document.dispatchEvent(new DragEvent('drop', { dataTransfer: drop, bubbles: true, cancelable: true }));
-  });
-  await until(() => globalThis.papilla.press.body.hello.triangles?.length === 4);
+/** Drops a file on the page, as a visitor does; resolves when its mesh presses. */
+async function drop(bytes, name) {
+  const before = await page.evaluateHandle(() => globalThis.papilla.press.body);
+  const base64 = Buffer.from(bytes).toString('base64');
+  await page.evaluate(([data, file]) => {
+    const transfer = new DataTransfer();
+    transfer.items.add(new File([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))], file));
+    for (const type of ['dragover', 'drop']) document.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+  }, [base64, name]);
+  await page.waitForFunction((old) => globalThis.papilla.press.body !== old, before, { timeout: PATIENCE_MS });
   await settled();
-  assert.match(await page.locator('#mesh-note').textContent(), /corner\.stl: 4 triangles; its own size/);
-  const { forceN } = await felt();
-  assert.ok(forceN > 0.001, `${forceN} N`);
+  return { note: await page.locator('#mesh-note').textContent(), size: await page.inputValue('#size'), forceN: (await felt()).forceN };
+}
+
+test('an STL or a GLB dropped on the page presses, in mm or in metres, and what was mended is said', async () => {
+  await page.fill('#depth', '1.5');
+  const closed = await drop(stlOf(dome({ radius: 6 })), 'part.stl');
+  assert.match(closed.note, /^part\.stl: 384 triangles; its own size\. Its side/);
+  assert.ok(closed.forceN > 0.01, `${closed.forceN} N`);
+  assert.equal(Number(closed.size), 12);
+  const near = ({ forceN }, why) => assert.ok(Math.abs(forceN / closed.forceN - 1) < 0.02, `${why}: ${forceN} N, of ${closed.forceN} N`);
+  // The same name, another body: what was dropped last presses.
+  const other = await drop(stlOf(dome({ radius: 9 })), 'part.stl');
+  assert.ok(other.forceN > 1.05 * closed.forceN, `${other.forceN} N of a larger ball`);
+  const metres = await drop(stlOf(dome({ radius: 0.006 })), 'metres.stl');
+  assert.match(metres.note, /0\.0120 long in the file: taken as metres, 12 mm\./);
+  near(metres, 'in metres');
+  const open = await drop(stlOf(dome({ radius: 6, isOpen: true })), 'cup.stl');
+  assert.match(open.note, /360 triangles; its own size; open: 1 hole closed with 24 triangles\./);
+  near(open, 'its hole closed, which the skin does not meet');
+  const glb = await drop(glbOf(dome({ radius: 6, isOpen: true })), 'cup.glb');
+  assert.match(glb.note, /360 triangles; its own size; open: 1 hole closed with 24 triangles\./);
+  near(glb, 'GLB');
+  const inside = await drop(stlOf(dome({ radius: 6 }).map((facet) => facet.reverse())), 'inside-out.stl');
+  assert.match(inside.note, /; it was inside out: turned\./);
+  near(inside, 'turned');
+  await keep('mesh-dropped');
+  assert.equal(await page.locator('body[data-dragging]').count(), 0, 'nothing is dragged any more');
+});
+
+test('what is no body is refused with the reason, and the last one goes on pressing', async () => {
+  const before = await page.evaluate(() => globalThis.papilla.press.body.hello.triangles.length);
+  const flat = dome({ radius: 6, isOpen: true }).map((facet) => facet.map(([x, y]) => [x, y, 0]));
+  for (const [bytes, name, why] of [[stlOf(flat), 'sheet.stl', /sheet\.stl is a surface without an inside: give it a thickness/], [new ArrayBuffer(10), 'notes.txt', /neither an STL nor a GLB/]]) {
+    await page.setInputFiles('#mesh-file', { name, mimeType: 'model/stl', buffer: Buffer.from(bytes) });
+    await until((pattern) => new RegExp(pattern).test(document.getElementById('notice').textContent), why.source);
+  }
+  await settled();
+  assert.equal(await page.evaluate(() => globalThis.papilla.press.body.hello.triangles.length), before);
   await chooseRadio('shape', 'plate');
+  await page.fill('#depth', '1');
   await settled();
 });
 
@@ -555,6 +597,39 @@ test('a hand: five fingertips of one session, each pressed and lifted by itself'
   assert.equal(await page.evaluate(() => globalThis.papilla.hand.hand), null);
   await settled();
   assert.ok((await felt()).forceN > 0);
+});
+
+test('the first screen shows the three promises, on a phone one at a time', async () => {
+  /** What of the elements does not lie on the first screen, above what lies at its foot. */
+  const beyond = (selectors) => page.evaluate((all) => {
+    window.scrollTo(0, 0);
+    const bar = document.querySelector('.quick');
+    const foot = getComputedStyle(bar).position === 'fixed' ? bar.getBoundingClientRect().top : window.innerHeight;
+    return all.filter((selector) => {
+      const element = document.querySelector(selector);
+      const box = element?.getBoundingClientRect();
+      const end = bar.contains(element) ? window.innerHeight : foot;
+      return !element?.checkVisibility() || box.top < 0 || box.left < 0 || box.bottom > end || (box.right > window.innerWidth && selector !== '#shapes');
+    });
+  }, selectors);
+  await chooseRadio('shape', 'sphere');
+  const pair = ['#pad', '#sed .stack', '#sed-ms', '#other .stack', '#other-ms', '#difference .stack', '#apart'];
+  await page.selectOption('#with', 'tier:small');
+  await until(() => globalThis.papilla.pictures.pair.apart > 0);
+  await page.setViewportSize({ width: 1440, height: 900 });
+  await settled();
+  const due = ['#ladder-plot', '#ladder-now', '#effect-summary', '#frame-bar', '#hard-cases', '.verdict'];
+  assert.deepEqual(await beyond([...pair, ...due]), [], 'on a desk');
+  await page.setViewportSize({ width: 390, height: 844 });
+  await settled();
+  for (const [promise, own] of Object.entries({ ladder: ['#ladder-plot', '#ladder-now'], effects: ['#frame-bar', '#effect-shear_energy', '#effect-relaxation', '#effect-afferents'], hard: ['#hard-cases', '.verdict'] })) {
+    await chooseRadio('promise', promise);
+    assert.deepEqual(await beyond([...pair, '#mode', '#shapes', '#depth', '#promise', ...own]), [], `${promise}, on a phone`);
+    assert.match(await page.locator(`#tab-${promise}`).textContent(), /\d|answered|refused/);
+    await keep(`promise-${promise}-phone`);
+  }
+  await chooseRadio('promise', 'ladder');
+  await page.selectOption('#with', '');
 });
 
 test('it fits a phone', async () => {

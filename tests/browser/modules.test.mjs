@@ -6,6 +6,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
+import { dome, stlOf } from './meshes.mjs';
 
 // The page's files in one folder, as server/build.rs puts them into the binary.
 const folder = await mkdtemp(join(tmpdir(), 'papilla-page-'));
@@ -29,10 +30,14 @@ const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
 const { OCTAHEDRON, SHAPES, heightsOfMesh, scaled } = await load('shapes.mjs');
 const { meshOf } = await load('mesh.mjs');
+const { indenterMesh } = await load('indenter.mjs');
+const { volumeOf } = await load('mend.mjs');
+const { sizeFor } = await load('files.mjs');
 const { bodyMesh, borderOf, followingOf, nailMesh } = await load('body.mjs');
 const { hashOf, npyOf, pythonOf, stateOf } = await load('share.mjs');
 const { rowsNear } = await load('spikes.mjs');
-const { verdictOf } = await load('hard.mjs');
+const { CASES, verdictOf } = await load('hard.mjs');
+const { countsOf, examplesOf } = await load('beside.mjs');
 const { adviseTier, logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
 const { defaultFor, errorFrom, setFor, suiting, suits, tierAfter, tierFor } = await load('tiers.mjs');
 const { aboutSet, aboutTier, nameOfSet, nameOfTier } = await load('words.mjs');
@@ -335,7 +340,7 @@ test('errors, sets and words are those of what is given', () => {
   assert.equal(setFor({ ...data, tiers: [{ ...small, relative_l2_median_from_poses: null }] }, sets, 'poses'), 'heldout-presses', 'the service does not judge by it');
   assert.deepEqual(['poses', 'nowhere'].map(nameOfSet), ['from poses', 'nowhere']);
   const about = aboutSet([{ name: 'poses', samples: 86, about: 'the states of `heldout-presses`, pressed by contact' }], 'poses');
-  assert.match(about, /^86 simulations: the states of “new presses, known shapes”, pressed by contact; for poses the service chooses by these/);
+  assert.match(about, /^86 simulations: the states of “new presses”, pressed by contact; for poses the service chooses by these/);
   assert.deepEqual(['nano-maps', 'small-maps', 'large-maps', 'small'].map(nameOfTier), ['nano for maps', 'small for maps', 'large for maps', 'small']);
   assert.deepEqual([suits(small, 'pressure'), suits(small, 'poses'), suits(maps, 'poses'), suits(tiny, 'poses'), suits(tiny, 'pressure')], [false, true, false, true, true]);
   assert.match(aboutTier('small', small, 'pressure'), /^It learnt the pressure that contact finds from poses; here maps/);
@@ -410,19 +415,10 @@ test('every shape presses with the point its pose names, and is drawn as it is s
   assert.ok(Math.abs(heights[48 * columns + 48] - 4) < 1e-6 && sideMm === 8, 'the tip of an octahedron stands over its middle');
 });
 
-/** A binary STL of a tetrahedron. */
-function stl(corners) {
-  const data = new ArrayBuffer(84 + 50 * corners.length);
-  const view = new DataView(data);
-  view.setUint32(80, corners.length, true);
-  corners.forEach((facet, n) => facet.flat().forEach((x, k) => view.setFloat32(84 + 50 * n + 12 + 4 * k, x, true)));
-  return data;
-}
-
 test('an STL and a GLB of one body are one mesh, and what is none says so', () => {
   const points = [[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]];
   const faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-  const mesh = meshOf(stl(faces.map((face) => face.map((k) => points[k]))), 'body.stl');
+  const mesh = meshOf(stlOf(faces.map((face) => face.map((k) => points[k]))), 'body.stl');
   assert.deepEqual([mesh.vertices_mm.length, mesh.triangles.length, mesh.sideMm], [4, 4, 10]);
   const text = `solid x\n${faces.map((face) => `facet normal 0 0 0 outer loop ${face.map((k) => `vertex ${points[k].join(' ')}`).join(' ')} endloop endfacet`).join('\n')}\nendsolid`;
   assert.deepEqual(meshOf(new TextEncoder().encode(text).buffer, 'body.STL').triangles, mesh.triangles);
@@ -447,7 +443,52 @@ test('an STL and a GLB of one body are one mesh, and what is none says so', () =
   other.vertices_mm.flat().forEach((x, k) => assert.ok(Math.abs(x - mesh.vertices_mm.flat()[k]) < 1e-3, `${x}`));
   assert.throws(() => meshOf(new ArrayBuffer(10), 'notes.txt'), /neither an STL nor a GLB/);
   assert.throws(() => meshOf(new ArrayBuffer(10), 'empty.stl'), /no triangle/);
-  assert.throws(() => meshOf(stl(Array(16385).fill([[0, 0, 0], [1, 0, 0], [0, 1, 0]])), 'large.stl'), /16385 triangles; a mesh may have 16384/);
+  assert.throws(() => meshOf(stlOf(Array(16385).fill([[0, 0, 0], [1, 0, 0], [0, 1, 0]])), 'large.stl'), /16385 triangles; a mesh may have 16384/);
+});
+
+test('a mesh is drawn as it is, its lowest point at the origin and its normals outward', () => {
+  const body = SHAPES.mesh.make(12, meshOf(stlOf(dome({ radius: 6 })), 'dome.stl'));
+  const drawn = indenterMesh({ shape: 'mesh', body });
+  assert.equal(drawn.length, 3 * 6 * body.hello.triangles.length);
+  let [least, most, lowest] = [Infinity, -Infinity, null];
+  for (let k = 0; k < drawn.length; k += 6) {
+    const [x, y, z] = drawn.subarray(k, k + 3);
+    [least, most] = [Math.min(least, z), Math.max(most, z)];
+    if (z === least) lowest = [x, y, z];
+    // The middle of the base is inside of the rest: what faces away from the finger is the base itself.
+    const outward = drawn[k + 3] * x + drawn[k + 4] * y + drawn[k + 5] * (z - 6);
+    assert.ok(outward > -1e-5, `vertex ${k / 6} looks inward: ${outward}`);
+  }
+  assert.ok(Math.abs(least) < 1e-5 && Math.abs(most - 6) < 1e-5, `${least} to ${most}`);
+  assert.ok(Math.hypot(...lowest) < 1e-5, `${lowest}`);
+});
+
+test('an open, doubled or inside-out mesh becomes a body, and what was mended is told', () => {
+  const box = dome({ radius: 6, around: 12, up: 4 });
+  const whole = meshOf(stlOf(box), 'dome.stl');
+  assert.deepEqual(whole.said, []);
+  const closedVolume = volumeOf(whole.vertices_mm, whole.triangles);
+  assert.ok(closedVolume > 0.8 * (2 / 3) * Math.PI * 216 && closedVolume < (2 / 3) * Math.PI * 216, `${closedVolume} mm3`);
+  const like = (facets, said) => {
+    const mesh = meshOf(stlOf(facets), 'dome.stl');
+    assert.deepEqual(mesh.said, said);
+    assert.ok(Math.abs(volumeOf(mesh.vertices_mm, mesh.triangles) / closedVolume - 1) < 1e-5, `${said}`);
+    const edges = new Map();
+    for (const [a, b, c] of mesh.triangles) for (const edge of [`${a} ${b}`, `${b} ${c}`, `${c} ${a}`]) edges.set(edge, (edges.get(edge) ?? 0) + 1);
+    for (const [edge, count] of edges) assert.ok(count === 1 && edges.get(edge.split(' ').reverse().join(' ')) === 1, `edge ${edge} of ${said}`);
+  };
+  like(dome({ radius: 6, around: 12, up: 4, isOpen: true }), ['open: 1 hole closed with 12 triangles']);
+  like(box.slice(1), ['open: 1 hole closed with 1 triangle']);
+  like([...box, box[3]], ['1 triangle that was there twice left out']);
+  like(box.map((facet) => [...facet].reverse()), ['it was inside out: turned']);
+  like(box.map((facet, n) => (n === 5 || n === 20 ? [...facet].reverse() : facet)), ['2 triangles turned outward']);
+  assert.throws(() => meshOf(stlOf(box.filter(([[, , z]]) => z === 0).slice(0, 1)), 'one.stl'), /without an inside/);
+});
+
+test('a file in metres is taken as such where that is a size of things that are touched', () => {
+  assert.deepEqual(sizeFor(12.3456), [12.35, 'its own size']);
+  assert.deepEqual(sizeFor(0.012), [12, '0.0120 long in the file: taken as metres, 12 mm']);
+  assert.deepEqual(sizeFor(120), [10, '120 mm in the file, made 10 mm']);
 });
 
 test('the finger is closed around its patch, and its nail lies on the nail side', () => {
@@ -497,6 +538,13 @@ test('the hard cases of the finite elements are those of the report', async () =
   const { summary, cases } = JSON.parse(file);
   const ends = cases.flatMap(({ variants }) => variants.map(([, end]) => end));
   const count = (...words) => ends.filter((end) => words.includes(end)).length;
+  for (const { name, beside } of CASES) for (const other of beside) assert.ok(cases.some((one) => one.name === other), `${name} stands beside ${other}, which is no case`);
+  const wedge = cases.find((one) => one.name === 'sharp-wedge').variants;
+  assert.match(countsOf(wedge), /^\d+ converge, \d+ stop with an error$/);
+  const shown = examplesOf(wedge);
+  assert.ok(shown.some(([, end]) => end === 'refused') && shown.some(([, end]) => end === 'converged'), 'both ends are shown');
+  assert.match(examplesOf(cases.find((one) => one.name === 'relaxation-times').variants, /NaN/)[0][0], /NaN/, 'what is alike comes first');
+  assert.ok(shown.filter(([, end]) => end === 'refused').every(([, , why]) => why.length > 20), 'each error says why');
   assert.equal(summary, `${ends.length} variants of ${cases.length} cases: ${count('converged', 'evaluated')} converged or evaluated, ${count('refused')} refused, 0 break their promise.`);
 });
 
