@@ -71,6 +71,7 @@ sealed partial class Run : IDisposable
             case "burst": Burst(step, expect); break;
             case "reconnect": Reconnect((double)step["within_s"]); break;
             case "move": Moved((double)step["within_s"]); break;
+            case "stay": Stayed((string)step["says"], (double)step["within_s"]); break;
             case "http": Http(step, expect); break;
             case "rasterise": Rasterise(step, expect); break;
             case "contacts": Contacts(step, expect); break;
@@ -308,6 +309,17 @@ sealed partial class Run : IDisposable
         // It may have moved between the steps.
         Until("another connection", () => session.Connections > connections ? session : null, (int)(1000 * withinS));
         connections = session.Connections;
+    }
+
+    /// <summary>It was asked to move and could not, and says why.</summary>
+    void Stayed(string why, double withinS)
+    {
+        // A warning wakes nobody up.
+        for (var watch = System.Diagnostics.Stopwatch.StartNew(); !session.Warnings.Any(words => words.Contains(why)); System.Threading.Thread.Sleep(5))
+        {
+            if (watch.Elapsed.TotalSeconds > withinS) throw new Missed("it does not say: " + why);
+        }
+        if (session.Connections != connections) throw new Missed("it has moved");
     }
 
     void Http(JObject step, JObject expect)

@@ -27,7 +27,7 @@ class Run {
     const auto steps = std::map<std::string, void (Run::*)(const Value&)>{
         {"hello", &Run::hello},         {"frame", &Run::frame},         {"burst", &Run::burst},
         {"reconnect", &Run::reconnect}, {"http", &Run::post},           {"rasterise", &Run::rasterise},
-        {"move", &Run::moved},
+        {"move", &Run::moved},          {"stay", &Run::stayed},
         {"address", &Run::address},     {"token", &Run::token},
         {"silence", &Run::silence},
         {"contacts", &Run::contacts},   {"touch", &Run::touch},         {"gaps", &Run::gaps}};
@@ -243,6 +243,19 @@ class Run {
       sleep_ms(5);
     }
     moved_ = session().connections();
+  }
+
+  /// It was asked to move and could not, and says why.
+  void stayed(const Value& step) {
+    const std::uint64_t begin = now_us();
+    const auto says = [&](const std::string& words) { return words.find(step["says"].string) != std::string::npos; };
+    for (;;) {
+      const std::vector<std::string> warnings = session().warnings();
+      if (std::any_of(warnings.begin(), warnings.end(), says)) break;
+      must(double(now_us() - begin) < 1e6 * step["within_s"].number, "it does not say: " + step["says"].string);
+      sleep_ms(5);
+    }
+    must(session().connections() == moved_, "it has moved");
   }
 
   void post(const Value& step) {

@@ -23,14 +23,16 @@ namespace Papilla
             internal ITransport Next;
             internal Hello Hello;
             internal byte[] State;
-            // A state that comes after its patience is not that of the last one asked for.
-            internal int Asked;
+            // Why it is given up; null: it is not.
+            internal string Stays;
             internal bool Holds { get { return Stage == Stage.Held || Stage == Stage.Sealed; } }
         }
 
         // Null: none.
         Move move;
         Thread mover;
+        // States that were asked for and have not come: one that comes after its patience is not that of the last one asked for.
+        int sealsDue;
 
         void OnReconnect()
         {
@@ -62,6 +64,20 @@ namespace Papilla
                 }
                 if (isDone) return;
                 next.Dispose();
+                string stays;
+                lock (gate)
+                {
+                    if (isClosed || move != own) return;
+                    stays = own.Stays;
+                    if (stays != null) move = null;
+                    Monitor.PulseAll(gate);
+                }
+                if (stays != null)
+                {
+                    var words = "the service asked the session to move, and did not say what it remembers (" + stays + "): it goes on over its old connection, and starts anew when that ends";
+                    if (IsNew(words)) TellPeople(words);
+                    return;
+                }
                 lock (gate)
                 {
                     if (isClosed || move != own) return;
@@ -85,7 +101,8 @@ namespace Papilla
                 while (move == own && own.Next == next && own.Stage != Stage.Sealed)
                 {
                     int left = MovePatienceMs - (int)watch.ElapsedMilliseconds;
-                    if (left <= 0 || isClosed) return false;
+                    if (left <= 0 && own.Stays == null) own.Stays = "nothing came within " + MovePatienceMs / 1000 + " s";
+                    if (own.Stays != null || isClosed) return false;
                     Monitor.Wait(gate, left);
                 }
                 if (move != own || own.Next != next) return false;
@@ -140,11 +157,24 @@ namespace Papilla
             Monitor.PulseAll(gate);
         }
 
+        /// <summary>Whether a refusal is in place of a seal, while nothing else is asked for; the move is then given up.</summary>
+        bool IsOfSeal(Problem problem)
+        {
+            lock (gate)
+            {
+                if (move == null || move.Stage != Stage.Held) return false;
+                if (--sealsDue > 0) return true;
+                move.Stays = problem.Message;
+                Monitor.PulseAll(gate);
+                return true;
+            }
+        }
+
         void OnSealed(int bytes)
         {
             lock (gate)
             {
-                if (move == null || --move.Asked > 0 || move.Stage != Stage.Held) return;
+                if (--sealsDue > 0 || move == null || move.Stage != Stage.Held) return;
                 move.State = new byte[bytes];
                 Array.Copy(message, move.State, bytes);
                 move.Stage = Stage.Sealed;

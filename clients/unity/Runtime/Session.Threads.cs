@@ -37,7 +37,7 @@ namespace Papilla
                     {
                         move.Stage = Stage.Held;
                         move.Hello = hello;
-                        move.Asked++;
+                        sealsDue++;
                     }
                     else
                     {
@@ -114,6 +114,7 @@ namespace Papilla
                     ready = null;
                     helloBefore = null;
                     move = null;
+                    sealsDue = 0;
                     Monitor.PulseAll(gate);
                     while (isRefused && !isClosed) Monitor.Wait(gate);
                 }
@@ -230,6 +231,7 @@ namespace Papilla
                 if (isOurs) Tell(problem.Sequence.Value, left.Finger, Status.Error, problem);
                 return true;
             }
+            if (IsOfSeal(problem)) return true;
             bool goesOn = OnRefusal(problem);
             if (!goesOn && IsNew("refused")) TellPeople("the session was refused: " + problem.Message);
             var refused = Refused;

@@ -59,8 +59,14 @@ class Core {
     ++seals_due_;
     return "{\"type\": \"seal\"}";
   }
-  /// Once for each that came: whether it is the one asked for last. Others are of moves that were given up.
+  /// Once for each that came, or was refused: whether it is the one asked for last. Others are of moves that were given up.
   bool is_last_seal() { return --seals_due_ == 0; }
+  /// The service did not say what it remembers: the session stays where it is.
+  void stay(const std::string& why) {
+    const std::string words = "the service asked the session to move, and did not say what it remembers (" + why +
+                              "): it goes on over its old connection, and starts anew when that ends";
+    if (is_new(words)) tell(words);
+  }
   /// Whether a binary message is that: it begins with PPS.
   static bool is_sealed(const std::uint8_t* bytes, std::size_t size) {
     return size > 3 && bytes[0] == 'P' && bytes[1] == 'P' && bytes[2] == 'S';

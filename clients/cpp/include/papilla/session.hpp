@@ -215,6 +215,8 @@ class Session {
   std::string new_hello_, pong_;
   bool is_answered_ = true, is_granted_ = false, pong_due_ = false;
   enum class Moving { no, dialling, seal_due, held, failed };
+  /// Longest wait for what the service remembers, and for the ready that follows.
+  static constexpr int seal_patience_s = 5;
   Moving moving_ = Moving::no;
 
   template <class Send>
@@ -334,6 +336,11 @@ class Session {
                              ? core_.text(text())
                              : core_.binary(message_.data(), message_.size());
       if (event == Core::Event::broken) return;
+      if (event == Core::Event::refused && moving_ == Moving::held) {
+        // In place of the seal: nothing else is asked for meanwhile.
+        if (core_.is_last_seal()) stay(core_.refusal().message);
+        continue;
+      }
       if (event == Core::Event::reconnect) {
         if (moving_ == Moving::no) dial(lock);
         continue;
@@ -364,8 +371,9 @@ class Session {
           moving_ = Moving::seal_due;
           changed_.notify_all();
           const auto over = [this] { return closed_ || moving_ == Moving::no || moving_ == Moving::failed; };
-          changed_.wait_for(held, std::chrono::seconds(5), over);
+          const bool ended = changed_.wait_for(held, std::chrono::seconds(seal_patience_s), over);
           next_.reset();
+          if (!ended) stay("nothing came within " + std::to_string(seal_patience_s) + " s");
           if (closed_ || moving_ == Moving::no) return;
         }
         // The old connection goes on for as long as it is there.
@@ -375,6 +383,13 @@ class Session {
         if (changed_.wait_for(held, std::chrono::milliseconds(options_.retry_ms), ends)) return;
       }
     });
+  }
+
+  /// Goes on over the old connection, which nobody asks for its seal again unless the service asks to move again.
+  void stay(const std::string& why) {
+    core_.stay(why);
+    moving_ = Moving::no;
+    changed_.notify_all();
   }
 
   /// Goes on over the other connection with what the service remembers; frames wait meanwhile.

@@ -382,6 +382,19 @@ func has_moved(before):
 	return session.connections > before
 
 
+# It was asked to move and could not, and says why.
+func step_stay(step, _expect):
+	if wait_for("has_said", step.says, int(step.within_s * 1000)):
+		same("connections", session.connections, connections)
+
+
+func has_said(words):
+	for warning in session.warnings:
+		if warning.find(words) >= 0:
+			return true
+	return false
+
+
 func step_http(step, expect):
 	var answer = Http.post_pressure(url, Patterns.pattern(step.pressure, 1.0), step.tier)
 	if answer.has("problem"):

@@ -1,6 +1,7 @@
 # A session's way to another connection when the service asks for it (docs/reference/protocol-moving.md): the connection is
 # opened while frames go on over the old one; then they wait until the old one has said what the service remembers,
-# sealed, and the new one is ready. Where a step fails, the old connection goes on, and it is tried again.
+# sealed, and the new one is ready. Where a step fails, the old connection goes on, and it is tried again; where the old one
+# does not say what the service remembers, that is the end of it until the service asks again.
 extends Reference
 
 const Compat = preload("compat.gd")
@@ -9,7 +10,7 @@ const PATIENCE_MS = 5000
 const RETRY_MS = 200
 const SEAL = "{\"type\": \"seal\"}"
 
-enum { PAUSE, DIALLING, SEAL_DUE, HELD, RESUMING }
+enum { PAUSE, DIALLING, SEAL_DUE, HELD, RESUMING, STAYS }
 
 # The other connection; null: none just now.
 var link = null
@@ -20,10 +21,26 @@ var _stage = PAUSE
 var _until_ms = 0
 # Seals that were asked for and have not come: one that comes after its patience is not the last one's.
 var _asked = 0
+# Why the session stays where it is; "": it does not.
+var _why = ""
 
 
 func _init(address):
 	_address = address
+
+
+# The service asks to move.
+func begin():
+	if _stage == STAYS:
+		_stage = PAUSE
+		_why = ""
+
+
+# Why the session stays, once; "" where there is nothing to tell.
+func take_reason():
+	var why = _why
+	_why = ""
+	return why
 
 
 # Whether frames have to wait.
@@ -55,6 +72,23 @@ func resume(sealed, hello, now):
 		put_off(now)
 
 
+# A refusal came over the old connection: whether it is in place of the seal, while nothing else is asked for.
+func takes_refusal(problem):
+	if _stage != HELD:
+		return false
+	_asked -= 1
+	if _asked <= 0:
+		_stay(problem.message)
+	return true
+
+
+# The old connection does not say what the service remembers: the session goes on over it.
+func _stay(why):
+	_why = why
+	_stage = STAYS
+	close()
+
+
 # Lets the old connection go on, and tries again.
 func put_off(now):
 	_stage = PAUSE
@@ -71,11 +105,13 @@ func close():
 # Moves bytes. The new session's ready, once; null before.
 func poll(now):
 	if link == null:
-		if now >= _until_ms:
+		if _stage != STAYS and now >= _until_ms:
 			_dial(now)
 		return null
 	var begins = link.poll()
-	if link.has_ended or now > _until_ms:
+	if _stage == HELD and now > _until_ms:
+		_stay("nothing came within %d s" % (PATIENCE_MS / 1000.0))
+	elif link.has_ended or now > _until_ms:
 		put_off(now)
 	elif _stage == DIALLING and begins:
 		_enter(SEAL_DUE, now)

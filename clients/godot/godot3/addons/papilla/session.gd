@@ -257,6 +257,10 @@ func _receive():
 # Goes on over another connection once that is ready; nothing is on its way then.
 func _follow(now):
 	var agreed = _move.poll(now)
+	var why = _move.take_reason()
+	if why != "":
+		var words = "the service asked the session to move, and did not say what it remembers (%s): it goes on over its old connection, and starts anew when that ends" % why
+		_warn(words, words)
 	if _move.is_seal_due() and server_ready != null:
 		_link.send_text(Move.SEAL)
 		_move.hold(now)
@@ -407,6 +411,7 @@ func _text(message):
 	elif message.type == "reconnect":
 		if _move == null:
 			_move = Move.new(_address())
+		_move.begin()
 	elif message.get("sequence") != null:
 		var sequence = int(message.sequence)
 		if _outstanding.has(sequence):
@@ -415,7 +420,7 @@ func _text(message):
 			_warn("error", "a frame was refused: " + message.message)
 			_tell({"status": "error", "sequence": sequence, "finger": finger, "problem": message})
 			_flush()
-	else:
+	elif _move == null or not _move.takes_refusal(message):
 		_on_refusal(message)
 		if _is_refused:
 			_warn("refused", "the session was refused: " + message.message)

@@ -232,8 +232,21 @@ void UPapillaSessionComponent::TickMove(double Now)
         Dial(Next);
         return;
     }
+    if (Move == EMove::Held)
+    {
+        Stay("nothing came in time");
+        return;
+    }
     HangUp(Next);
     PutOffMove();
+}
+
+void UPapillaSessionComponent::Stay(const std::string& Why)
+{
+    Core->stay(Why);
+    Move = EMove::No;
+    HangUp(Next);
+    Pump();
 }
 
 void UPapillaSessionComponent::HandleText(const FString& Message)
@@ -245,6 +258,12 @@ void UPapillaSessionComponent::HandleText(const FString& Message)
         Pump();
         break;
     case papilla::Core::Event::refused:
+        if (Move == EMove::Held)
+        {
+            // In place of the seal: nothing else is asked for meanwhile.
+            if (Core->is_last_seal()) Stay(Core->refusal().message);
+            break;
+        }
         OnRefused.Broadcast(ToFString(Core->refusal().code), ToFString(Core->refusal().message));
         break;
     case papilla::Core::Event::broken:

@@ -166,6 +166,10 @@ public:
     /** The newest answer with all it carries: summary, points, actuators, times. */
     const papilla::Answer& Latest() const { return Answer; }
 
+    /** Whether a session is open, and what the service agreed to then. */
+    bool IsReady() const { return Core && Core->is_ready(); }
+    const papilla::json::Value& ReadyMessage() const { return Core->ready().message; }
+
     /** Sends a window of the map: its samples, Pa, row by row. */
     int32 SendWindow(const float* PressurePa, const papilla::Window& Window, uint32 DeadlineUs = 0);
 
@@ -183,6 +187,8 @@ private:
     void Broke(const IWebSocket* Of);
     void Enter(EMove To);
     void PutOffMove();
+    /** Goes on over the old connection: the service did not say what the session remembers. */
+    void Stay(const std::string& Why);
     void Resume();
     void Adopt(const FString& Message);
     void TickMove(double Now);
