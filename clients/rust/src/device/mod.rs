@@ -3,6 +3,8 @@
 
 use std::time::{Duration, Instant};
 
+use papilla_proto::spikes::{PlacedUnit, UnitClass};
+
 use crate::{Answer, PapillaError};
 
 #[cfg(test)]
@@ -26,6 +28,17 @@ pub enum DeviceError {
         value: f64,
         /// What it has to be above.
         least: f64,
+    },
+    /// No unit is of the classes that the device follows.
+    #[error(
+        "none of the session's {units} units is of the classes {classes:?}: name the effect \
+         'spikes' in the hello, and classes that its units have"
+    )]
+    NoUnits {
+        /// How many units there are.
+        units: usize,
+        /// The classes.
+        classes: Vec<UnitClass>,
     },
     /// The answer is of a finger that the device does not have.
     #[error("finger {finger} is none of the device, which has {fingers}, numbered from 0")]
@@ -76,6 +89,44 @@ pub fn actuators(full: f64) -> Result<Read, DeviceError> {
         }
         let share = |&value: &f32| (f64::from(value) / full) as f32;
         Ok(Some(answer.actuators.iter().map(share).collect()))
+    }))
+}
+
+/// After a longer pause the service computes its last 50 ms.
+const SPIKES_US_MAX: u64 = 50_000;
+
+/// One intensity of the effect `spikes`: the mean firing rate of the units of some classes, 1 from
+/// `full_hz` on. Most units lie outside of a contact: a few Hz are much. Rapidly adapting and
+/// Pacinian units fire at changes, as a motor should. `units` are those of the session's ready. It
+/// remembers the frame before: make one for each finger.
+///
+/// # Errors
+/// `full_hz` is not above 0, or no unit is of these classes.
+pub fn spike_rate(
+    units: &[PlacedUnit],
+    full_hz: f64,
+    classes: &[UnitClass],
+) -> Result<Read, DeviceError> {
+    above("full_hz", full_hz, 0.0)?;
+    let mine: Vec<bool> = units.iter().map(|unit| classes.contains(&unit.class)).collect();
+    let count = mine.iter().filter(|&&is_mine| is_mine).count();
+    if count == 0 {
+        return Err(DeviceError::NoUnits { units: units.len(), classes: classes.to_vec() });
+    }
+    let mut last_us = None;
+    Ok(Box::new(move |answer| {
+        let advice = "name the effect 'spikes' in the hello";
+        let fired =
+            answer.fired.as_ref().ok_or(PapillaError::NotCarried { member: "spikes", advice })?;
+        let now_us = answer.client_time_us;
+        let passed_us = last_us.replace(now_us).map_or(0, |last: u64| now_us.saturating_sub(last));
+        if passed_us == 0 {
+            return Ok(None);
+        }
+        let seconds = 1e-6 * passed_us.min(SPIKES_US_MAX) as f64;
+        let is_mine = |unit: u16| mine.get(usize::from(unit)).is_some_and(|&is_mine| is_mine);
+        let fired = fired.spikes.iter().filter(|spike| is_mine(spike.unit)).count();
+        Ok(Some(vec![(fired as f64 / (count as f64 * seconds * full_hz)) as f32]))
     }))
 }
 

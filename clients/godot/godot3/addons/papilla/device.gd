@@ -8,13 +8,17 @@
 #   	if command != null: Input.start_joy_vibration(0, command.amplitude, command.amplitude, command.duration_s)
 extends Reference
 
-# What is felt: "force", the size of the force on the finger; of pressure maps the effect `summary` has it. Or "actuators",
-# an intensity for each actuator of that effect. Override `read` for something else.
+# What is felt: "force", the size of the force on the finger; of pressure maps the effect `summary` has it. "actuators", an
+# intensity for each actuator of that effect. "spikes", the mean firing rate of units of the effect of this name; most units lie
+# outside of a contact, so that a few Hz are much. Override `read` for something else.
 var source = "force"
-# What intensity 1 stands for: N, or the `intensity_max` of actuators.
+# What intensity 1 stands for: N, the `intensity_max` of actuators, or Hz.
 var full = 1.0
 # A force up to here is not felt, N.
 var threshold_n = 0.0
+# For spikes, `units` of the session's ready, and the classes that count: rapidly adapting and Pacinian ones fire at changes.
+var units = []
+var classes = ["ra", "pc"]
 var fingers = 1
 # Commands a second that the device takes.
 var max_hz = 90.0
@@ -22,7 +26,11 @@ var max_hz = 90.0
 var hold_s = 0.05
 var fade_s = 0.05
 
+# After a longer pause the service computes its last 50 ms.
+const SPIKES_US_MAX = 50000
+
 # By finger.
+var _last_us = {}
 var _values = {}
 var _at_s = {}
 var _next_s = -INF
@@ -33,6 +41,8 @@ var _is_silent = true
 func read(answer):
 	if source == "actuators":
 		return _actuators(answer)
+	if source == "spikes":
+		return _spikes(answer)
 	if answer.has("touch"):
 		return [_share(answer.touch.force_n.length())]
 	if answer.has("summary"):
@@ -53,6 +63,8 @@ func fault():
 	for name in ["full", "max_hz", "hold_s", "fade_s"]:
 		if not get(name) > (threshold_n if name == "full" and source == "force" else 0.0) or is_inf(get(name)):
 			return "%s is %s" % [name, get(name)]
+	if source == "spikes" and _count() == 0:
+		return "none of %d units is of the classes %s: set `units` of the session's ready" % [units.size(), classes]
 	return ""
 
 
@@ -132,6 +144,28 @@ func _command(duration_s):
 
 func _share(force_n):
 	return (force_n - threshold_n) / (full - threshold_n)
+
+
+# How many units count.
+func _count():
+	var count = 0
+	for unit in units:
+		count += int(classes.has(unit["class"]))
+	return count
+
+
+func _spikes(answer):
+	if not answer.has("spikes"):
+		push_error("papilla: the answer carries no spikes: name that effect in the hello")
+		return null
+	var passed_us = answer.client_time_us - _last_us.get(answer.finger, answer.client_time_us)
+	_last_us[answer.finger] = answer.client_time_us
+	if passed_us <= 0:
+		return null
+	var fired = 0
+	for spike in answer.spikes:
+		fired += int(spike.unit < units.size() and classes.has(units[spike.unit]["class"]))
+	return [fired / (_count() * 1e-6 * min(passed_us, SPIKES_US_MAX) * full)]
 
 
 func _actuators(answer):

@@ -117,6 +117,8 @@ static func read_sections(answer, packet, sections):
 			# How wrong this answer is likely to be, relative to finite elements; what is not stated is infinite.
 			var errors = Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
 			answer.error_estimate = {"sed_median": errors[0], "sed_p90": errors[1], "force_median": errors[2], "force_p90": errors[3]}
+		elif section.name == "spikes":
+			_read_spikes(answer, packet, from)
 		elif section.name == "touch":
 			answer.touch = Touch.read(Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1)))
 		else:
@@ -124,6 +126,17 @@ static func read_sections(answer, packet, sections):
 	if not answer.has_map:
 		answer.width = 0
 		answer.height = 0
+
+
+# Numbers of the units that fired, in ready's `units`, and when, us, by the client's clock; those of the finger since the hello too.
+static func _read_spikes(answer, packet, from):
+	var section = StreamPeerBuffer.new()
+	section.data_array = packet.subarray(from, packet.size() - 1)
+	answer.spikes_total = section.get_u32()
+	answer.spikes = []
+	for _k in section.get_u32():
+		var unit = section.get_u16()
+		answer.spikes.append({"unit": unit, "time_us": answer.client_time_us - section.get_u16()})
 
 
 # The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.

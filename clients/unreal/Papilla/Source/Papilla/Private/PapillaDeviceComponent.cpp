@@ -11,6 +11,26 @@ void UPapillaDeviceComponent::BeginPlay()
 {
     Super::BeginPlay();
     Session = GetOwner()->FindComponentByClass<UPapillaSessionComponent>();
+    if (!Session)
+    {
+        UE_LOG(LogTemp, Error, TEXT("Papilla: a device needs a Papilla Session on the same actor"));
+        return;
+    }
+    if (Source == EPapillaDeviceSource::Spikes)
+    {
+        Session->OnReady.AddDynamic(this, &UPapillaDeviceComponent::HandleReady);
+        if (Session->IsReady()) HandleReady();
+    }
+    else if (!Make())
+    {
+        return;
+    }
+    Session->OnTouched.AddDynamic(this, &UPapillaDeviceComponent::HandleTouched);
+    Session->OnMapReceived.AddDynamic(this, &UPapillaDeviceComponent::HandleMap);
+}
+
+bool UPapillaDeviceComponent::Make()
+{
     papilla::Device::Options Options;
     Options.fingers = static_cast<size_t>(FMath::Max(Fingers, 1));
     Options.max_hz = MaxHz;
@@ -19,22 +39,23 @@ void UPapillaDeviceComponent::BeginPlay()
     Options.clock_s = [] { return FPlatformTime::Seconds(); };
     try
     {
-        const papilla::ReadLevels Read =
-            Source == EPapillaDeviceSource::Force ? papilla::device_force(Full, ThresholdN) : papilla::device_actuators(Full);
+        const papilla::ReadLevels Read = Source == EPapillaDeviceSource::Force ? papilla::device_force(Full, ThresholdN)
+            : Source == EPapillaDeviceSource::Actuators ? papilla::device_actuators(Full)
+                                                        : papilla::device_spike_rate(Session->ReadyMessage()["units"], Full);
         Device = MakeUnique<papilla::Device>(Read, Options);
     }
-    catch (const std::invalid_argument& Error)
+    catch (const std::logic_error& Error)
     {
         UE_LOG(LogTemp, Error, TEXT("Papilla: no device: %s"), UTF8_TO_TCHAR(Error.what()));
-        return;
+        Device = nullptr;
     }
-    if (!Session)
-    {
-        UE_LOG(LogTemp, Error, TEXT("Papilla: a device needs a Papilla Session on the same actor"));
-        return;
-    }
-    Session->OnTouched.AddDynamic(this, &UPapillaDeviceComponent::HandleTouched);
-    Session->OnMapReceived.AddDynamic(this, &UPapillaDeviceComponent::HandleMap);
+    return Device != nullptr;
+}
+
+void UPapillaDeviceComponent::HandleReady()
+{
+    if (Device) Send(Device->stop());
+    Make();
 }
 
 void UPapillaDeviceComponent::EndPlay(const EEndPlayReason::Type Reason)
@@ -71,6 +92,7 @@ void UPapillaDeviceComponent::HandleMap(int32, float)
 
 void UPapillaDeviceComponent::Feed()
 {
+    if (!Device) return;
     try
     {
         Device->feed(Session->Latest());

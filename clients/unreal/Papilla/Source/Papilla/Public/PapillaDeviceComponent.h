@@ -17,6 +17,8 @@ enum class EPapillaDeviceSource : uint8
     Force,
     /** An intensity for each actuator of the effect "actuators". */
     Actuators,
+    /** The mean firing rate of the rapidly adapting and Pacinian units of the effect "spikes"; most lie outside of a contact: a few Hz are much. */
+    Spikes,
 };
 
 DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaDeviceCommand, float, Amplitude, float, DurationSeconds);
@@ -36,7 +38,7 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
     EPapillaDeviceSource Source = EPapillaDeviceSource::Force;
 
-    /** What intensity 1 stands for: N, or the "max" of actuators. */
+    /** What intensity 1 stands for: N, the "max" of actuators, or Hz. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
     float Full = 1.0f;
 
@@ -77,6 +79,11 @@ private:
     UFUNCTION()
     void HandleMap(int32 Sequence, float SedMaxJPerM3);
 
+    /** Units are the session's: where spikes are followed, the device begins anew with each Ready. */
+    UFUNCTION()
+    void HandleReady();
+
+    bool Make();
     void Feed();
     void Send(const papilla::DeviceCommand& Command);
 
