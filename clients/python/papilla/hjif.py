@@ -91,7 +91,7 @@ def document(
         "version": "2023",
         "profile": "Simple Parametric",
         "level": 1 if len(channels) <= _CHANNELS_LEVEL_1 else 2,
-        "date": (date or datetime.now(UTC)).strftime("%Y-%m-%d"),
+        "date": _written(date or datetime.now(UTC)),
         "description": _short(description),
         "timescale": TICKS_PER_S,
         "avatars": [],
@@ -110,6 +110,11 @@ def document(
         ],
         "syncs": [],
     }
+
+
+def _written(date: datetime) -> str:
+    """Date and time as RFC 3339 has them; a date without a zone is one of UTC."""
+    return (date if date.tzinfo is None else date.astimezone(UTC)).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def write(path: str | PathLike[str], times_s: ArrayLike, levels: ArrayLike, **how: Any) -> None:
