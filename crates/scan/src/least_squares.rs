@@ -1,34 +1,14 @@
 //! Small least-squares problems: dense normal equations, and Levenberg's method over them.
 
-/// Solves `A x = b` for a symmetric positive definite `A` (row-major), by Cholesky; `None` if it is
-/// not.
-pub(crate) fn solve(mut a: Vec<f64>, mut b: Vec<f64>) -> Option<Vec<f64>> {
+use faer::linalg::solvers::Solve;
+use faer::{Col, Mat, Side};
+
+/// Solves `A x = b` for a symmetric positive definite `A` (row-major); `None` if it is not.
+pub(crate) fn solve(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let n = b.len();
-    for j in 0..n {
-        for k in 0..j {
-            let factor = a[j * n + k];
-            for i in j..n {
-                a[i * n + j] -= factor * a[i * n + k];
-            }
-        }
-        let pivot = a[j * n + j];
-        if !(pivot > 0.0 && pivot.is_finite()) {
-            return None;
-        }
-        let root = pivot.sqrt();
-        for i in j..n {
-            a[i * n + j] /= root;
-        }
-    }
-    for i in 0..n {
-        let sum: f64 = (0..i).map(|k| a[i * n + k] * b[k]).sum();
-        b[i] = (b[i] - sum) / a[i * n + i];
-    }
-    for i in (0..n).rev() {
-        let sum: f64 = (i + 1..n).map(|k| a[k * n + i] * b[k]).sum();
-        b[i] = (b[i] - sum) / a[i * n + i];
-    }
-    Some(b)
+    let factor = Mat::from_fn(n, n, |i, k| a[i * n + k]).llt(Side::Lower).ok()?;
+    let x = factor.solve(&Col::from_fn(n, |i| b[i]));
+    x.iter().all(|v| v.is_finite()).then(|| x.iter().copied().collect())
 }
 
 /// One parameter: where it begins, where it may go, and a step over which residuals change evenly.
@@ -87,7 +67,7 @@ pub(crate) fn minimise(
                 // A parameter that nothing depends on stays where it is.
                 damped[k * n + k] += damping * square[k * n + k] + 1e-9;
             }
-            if let Some(by) = solve(damped, slope.clone()) {
+            if let Some(by) = solve(&damped, &slope) {
                 let to: Vec<f64> = (0..n)
                     .map(|k| (x[k] + by[k]).clamp(parameters[k].range[0], parameters[k].range[1]))
                     .collect();
@@ -117,9 +97,9 @@ mod tests {
 
     #[test]
     fn a_small_system_is_solved_and_an_indefinite_one_is_not() {
-        let x = solve(vec![4.0, 2.0, 2.0, 3.0], vec![10.0, 8.0]).unwrap();
+        let x = solve(&[4.0, 2.0, 2.0, 3.0], &[10.0, 8.0]).unwrap();
         assert!((x[0] - 1.75).abs() < 1e-14 && (x[1] - 1.5).abs() < 1e-14, "{x:?}");
-        assert!(solve(vec![1.0, 2.0, 2.0, 1.0], vec![1.0, 1.0]).is_none());
+        assert!(solve(&[1.0, 2.0, 2.0, 1.0], &[1.0, 1.0]).is_none());
     }
 
     #[test]

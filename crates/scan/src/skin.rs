@@ -137,7 +137,7 @@ fn field(distances: &[Option<f64>]) -> Option<SkinOffset> {
             add(&[(r, c, 1.0)], 0.0, AT_REST);
         }
     }
-    let values = solve(a, b)?;
+    let values = solve(&a, &b)?;
     let rows = values.chunks_exact(COLUMNS).map(<[f64]>::to_vec).collect();
     Some(SkinOffset::smooth(rows))
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::{
-    extract::{Extension, State},
+    extract::State,
     http::{HeaderMap, Uri},
 };
 use papilla_codec::encode_mask;
@@ -16,50 +16,33 @@ use crate::{
     core::{
         cache::Content,
         catalogue::{Catalogue, Document},
+        fingers::Loaded,
     },
     problem,
     transport::{
         answer::{Answer, Shared, cached, refuse},
         app::App,
-        gate::Principal,
-        http::finger,
+        http::finger::Asked,
     },
 };
 
-type Caller = Extension<Principal>;
-
-pub(crate) async fn json(
-    State(app): Shared,
-    Extension(caller): Caller,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Answer {
-    serve(&app, &caller, &uri, &headers, Document::Atlas, |catalogue| {
+pub(crate) async fn json(State(app): Shared, Asked(finger): Asked, headers: HeaderMap) -> Answer {
+    serve(&app, finger, &headers, Document::Atlas, |catalogue| {
         Ok(Content::new("application/json", catalogue.atlas_json.clone()))
     })
     .await
 }
 
-pub(crate) async fn obj(
-    State(app): Shared,
-    Extension(caller): Caller,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Answer {
-    serve(&app, &caller, &uri, &headers, Document::AtlasObj, |catalogue| {
+pub(crate) async fn obj(State(app): Shared, Asked(finger): Asked, headers: HeaderMap) -> Answer {
+    serve(&app, finger, &headers, Document::AtlasObj, |catalogue| {
         Ok(Content::new("model/obj", catalogue.atlas.to_obj()))
     })
     .await
 }
 
 /// Both patches as binary glTF, each with its mask as a texture.
-pub(crate) async fn glb(
-    State(app): Shared,
-    Extension(caller): Caller,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Answer {
-    serve(&app, &caller, &uri, &headers, Document::AtlasGlb, |catalogue| {
+pub(crate) async fn glb(State(app): Shared, Asked(finger): Asked, headers: HeaderMap) -> Answer {
+    serve(&app, finger, &headers, Document::AtlasGlb, |catalogue| {
         let masks = [png(&catalogue.skin)?, png(&catalogue.interface)?];
         Ok(Content::new("model/gltf-binary", catalogue.atlas.to_glb(&masks)))
     })
@@ -69,7 +52,7 @@ pub(crate) async fn glb(
 /// White where the patch is: the interface, or with `?patch=skin` the skin.
 pub(crate) async fn mask(
     State(app): Shared,
-    Extension(caller): Caller,
+    Asked(finger): Asked,
     uri: Uri,
     headers: HeaderMap,
 ) -> Answer {
@@ -77,7 +60,7 @@ pub(crate) async fn mask(
         Ok(patch) => patch,
         Err(problem) => return refuse(&app, problem),
     };
-    serve(&app, &caller, &uri, &headers, Document::Mask(patch), move |catalogue| {
+    serve(&app, finger, &headers, Document::Mask(patch), move |catalogue| {
         let raster = match patch {
             Patch::Skin => &catalogue.skin,
             Patch::Interface => &catalogue.interface,
@@ -112,16 +95,11 @@ fn png(raster: &Raster) -> Result<Vec<u8>, Problem> {
 
 async fn serve(
     app: &Arc<App>,
-    caller: &Principal,
-    uri: &Uri,
+    Loaded { catalogue, .. }: Loaded,
     headers: &HeaderMap,
     document: Document,
     make: impl FnOnce(&Catalogue) -> Result<Content, Problem> + Send + 'static,
 ) -> Answer {
-    let catalogue = match finger::asked(app, caller, uri).await {
-        Ok(finger) => finger.catalogue,
-        Err(problem) => return refuse(app, problem),
-    };
     let of = Arc::clone(&catalogue);
     let made = cached(&catalogue.cache, headers, document, move || make(&of)).await;
     made.or_else(|problem| refuse(app, problem))

@@ -1,9 +1,5 @@
 //! `GET /v1/effects`: what a session can ask for, and what that costs here.
 
-use axum::{
-    extract::{Extension, State},
-    http::Uri,
-};
 use papilla_proto::RuntimeEffect;
 use papilla_session_contact::ContactAssets;
 use serde_json::{Value, json};
@@ -11,21 +7,12 @@ use serde_json::{Value, json};
 use crate::{
     core::fingers::Loaded,
     transport::{
-        answer::{Answer, Shared, json_answer, refuse},
-        gate::Principal,
-        http::finger,
+        answer::{Answer, json_answer},
+        http::finger::Asked,
     },
 };
 
-pub(crate) async fn list(
-    State(app): Shared,
-    Extension(caller): Extension<Principal>,
-    uri: Uri,
-) -> Answer {
-    let Loaded { catalogue, contact } = match finger::asked(&app, &caller, &uri).await {
-        Ok(finger) => finger,
-        Err(problem) => return refuse(&app, problem),
-    };
+pub(crate) async fn list(Asked(Loaded { catalogue, contact }): Asked) -> Answer {
     let costs = catalogue.runtime.costs();
     // It is of the contact model, and timed with it.
     let shear_us = contact.as_deref().and_then(ContactAssets::shear_us);

@@ -2,7 +2,10 @@
 
 use std::{sync::Arc, sync::atomic::Ordering};
 
-use axum::{extract::State, http::Uri};
+use axum::{
+    extract::{FromRequestParts, State},
+    http::{Uri, request::Parts},
+};
 use papilla_proto::{ErrorCode, Problem, contact::DEFAULT_FINGER};
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
@@ -14,7 +17,7 @@ use crate::{
     },
     problem,
     transport::{
-        answer::{Answer, Shared, json_answer, refuse},
+        answer::{Answer, HttpProblem, Shared, json_answer, refuse},
         app::App,
         first_use,
         gate::Principal,
@@ -68,6 +71,24 @@ fn loaded(Loaded { catalogue, contact }: &Loaded, memory: Option<Memory>) -> Val
         "files_bytes": memory.map(|memory| memory.files_bytes),
         "grown_bytes": memory.and_then(|memory| memory.grown_bytes),
     })
+}
+
+/// What a handler takes to answer for the finger that its request [asks about](asked).
+pub(crate) struct Asked(pub(crate) Loaded);
+
+impl FromRequestParts<Arc<App>> for Asked {
+    type Rejection = HttpProblem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, HttpProblem> {
+        let finger = match parts.extensions.get::<Principal>() {
+            Some(caller) => asked(app, caller, &parts.uri).await,
+            None => Err(problem::internal("nobody is known to ask", &"no gate in front")),
+        };
+        finger.map(Self).map_err(|problem| {
+            app.metrics.error(problem.code);
+            HttpProblem(problem)
+        })
+    }
 }
 
 /// The finger that a request asks about with the parameter `finger`; without, the default one. One

@@ -3,8 +3,8 @@
 use std::sync::{Arc, atomic::Ordering};
 
 use axum::{
-    extract::{Extension, State},
-    http::{HeaderMap, HeaderValue, StatusCode, Uri, header},
+    extract::State,
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     response::Response,
 };
 use papilla_metrics::Metrics;
@@ -23,8 +23,7 @@ use crate::{
     problem, progress,
     transport::{
         answer::{Answer, Shared, answer, cached, json_answer, refusal::label, refuse},
-        gate::Principal,
-        http::finger,
+        http::finger::Asked,
     },
 };
 
@@ -77,15 +76,7 @@ pub(crate) async fn metrics(State(app): Shared) -> Answer {
     Ok(answer("application/openmetrics-text; version=1.0.0; charset=utf-8", text))
 }
 
-pub(crate) async fn tiers(
-    State(app): Shared,
-    Extension(caller): Extension<Principal>,
-    uri: Uri,
-) -> Answer {
-    let Loaded { catalogue, contact } = match finger::asked(&app, &caller, &uri).await {
-        Ok(finger) => finger,
-        Err(problem) => return refuse(&app, problem),
-    };
+pub(crate) async fn tiers(Asked(Loaded { catalogue, contact }): Asked) -> Answer {
     let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     // The ladder is long and never changes: its JSON is put in as it is.
     let text = format!(
@@ -138,14 +129,9 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
 
 pub(crate) async fn models(
     State(app): Shared,
-    Extension(caller): Extension<Principal>,
-    uri: Uri,
+    Asked(Loaded { catalogue, .. }): Asked,
     headers: HeaderMap,
 ) -> Answer {
-    let catalogue = match finger::asked(&app, &caller, &uri).await {
-        Ok(finger) => finger.catalogue,
-        Err(problem) => return refuse(&app, problem),
-    };
     let of = Arc::clone(&catalogue);
     let make = move || {
         let cards: Vec<&Value> = of.offered().map(|(_, tier)| &tier.card).collect();

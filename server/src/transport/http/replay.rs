@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::{
-    extract::{Extension, State as AppState},
+    extract::State as AppState,
     http::{HeaderMap, Uri},
 };
 use bytes::BytesMut;
@@ -20,29 +20,21 @@ use crate::{
     core::{
         cache::Content,
         catalogue::{Catalogue, Document, replay::State},
+        fingers::Loaded,
     },
     problem,
     transport::{
         answer::{Answer, Shared, cached, refuse},
-        app::App,
-        gate::Principal,
-        http::finger,
+        http::finger::Asked,
         negotiate,
     },
 };
 
-type Caller = Extension<Principal>;
-
 pub(crate) async fn list(
     AppState(app): Shared,
-    Extension(caller): Caller,
-    uri: Uri,
+    Asked(Loaded { catalogue, .. }): Asked,
     headers: HeaderMap,
 ) -> Answer {
-    let catalogue = match finger::asked(&app, &caller, &uri).await {
-        Ok(finger) => finger.catalogue,
-        Err(problem) => return refuse(&app, problem),
-    };
     let of = Arc::clone(&catalogue);
     let make = move || {
         let states = of.replay.states.iter().enumerate().map(|(id, state)| {
@@ -56,17 +48,8 @@ pub(crate) async fn list(
     made.or_else(|problem| refuse(&app, problem))
 }
 
-/// The finger that is asked about, and the number of the state in the path, `/v1/presses/{press}`.
-async fn asked(
-    app: &Arc<App>,
-    caller: &Principal,
-    uri: &Uri,
-) -> Result<(Arc<Catalogue>, usize), Problem> {
-    let catalogue = finger::asked(app, caller, uri).await?.catalogue;
-    let state = find(&catalogue, uri)?;
-    Ok((catalogue, state))
-}
-
+/// The state whose number stands in the path, `/v1/presses/{press}`.
+///
 /// Taken from the raw path: axum's own extractor would refuse broken percent-encoding in
 /// words that are not our JSON.
 fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
@@ -94,12 +77,12 @@ fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
 /// Values read from the maps at the atlas' vertices, in its order.
 pub(crate) async fn one(
     AppState(app): Shared,
-    Extension(caller): Caller,
+    Asked(Loaded { catalogue, .. }): Asked,
     uri: Uri,
     headers: HeaderMap,
 ) -> Answer {
-    let (catalogue, state) = match asked(&app, &caller, &uri).await {
-        Ok(asked) => asked,
+    let state = match find(&catalogue, &uri) {
+        Ok(state) => state,
         Err(problem) => return refuse(&app, problem),
     };
     let of = Arc::clone(&catalogue);
@@ -123,25 +106,24 @@ pub(crate) async fn one(
 }
 
 /// The pressure as a map, ready to be posted.
-pub(crate) async fn pressure(app: Shared, caller: Caller, uri: Uri, headers: HeaderMap) -> Answer {
-    map(app, caller, &uri, &headers, Quantity::Pressure).await
+pub(crate) async fn pressure(app: Shared, asked: Asked, uri: Uri, headers: HeaderMap) -> Answer {
+    map(app, asked, &uri, &headers, Quantity::Pressure).await
 }
 
 /// The FE solver's SED as a map.
-pub(crate) async fn sed(app: Shared, caller: Caller, uri: Uri, headers: HeaderMap) -> Answer {
-    map(app, caller, &uri, &headers, Quantity::Sed).await
+pub(crate) async fn sed(app: Shared, asked: Asked, uri: Uri, headers: HeaderMap) -> Answer {
+    map(app, asked, &uri, &headers, Quantity::Sed).await
 }
 
 async fn map(
     AppState(app): Shared,
-    Extension(caller): Caller,
+    Asked(Loaded { catalogue, .. }): Asked,
     uri: &Uri,
     headers: &HeaderMap,
     quantity: Quantity,
 ) -> Answer {
-    let asked = asked(&app, &caller, uri).await;
-    let asked = asked.and_then(|(of, state)| Ok((of, state, negotiate::output(headers)?)));
-    let (catalogue, state, output) = match asked {
+    let asked = find(&catalogue, uri).and_then(|state| Ok((state, negotiate::output(headers)?)));
+    let (state, output) = match asked {
         Ok(asked) => asked,
         Err(problem) => return refuse(&app, problem),
     };

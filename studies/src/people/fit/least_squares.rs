@@ -4,6 +4,8 @@
 //! differences once, and again when a step fails; between, Broyden's update learns it from the steps
 //! themselves. What stands at a bound and would leave stays there.
 
+use faer::linalg::solvers::Solve;
+use faer::{Col, Mat, Side};
 use serde::Serialize;
 
 /// Distance of difference quotients.
@@ -186,7 +188,7 @@ fn step(at: &[f64], here: &[f64], jacobian: &[Vec<f64>], damping: f64) -> Vec<f6
                 -slope[i] - (0..n).map(held).sum::<f64>()
             })
             .collect();
-        let moves = solved(matrix, right);
+        let moves = solved(&matrix, &right);
         let out = free.iter().zip(&moves).find(|(k, d)| !(0.0..=1.0).contains(&(at[**k] + **d)));
         match out {
             Some((&k, d)) => fixed[k] = Some((at[k] + d).clamp(0.0, 1.0) - at[k]),
@@ -200,24 +202,14 @@ fn step(at: &[f64], here: &[f64], jacobian: &[Vec<f64>], damping: f64) -> Vec<f6
     }
 }
 
-/// Cholesky's factorization, in place, of a matrix that is positive definite.
-fn solved(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
+/// `A d = b` of a matrix that is positive definite; no step where it is not.
+fn solved(a: &[Vec<f64>], b: &[f64]) -> Vec<f64> {
     let n = b.len();
-    for k in 0..n {
-        for i in k..n {
-            let sum: f64 = (0..k).map(|m| a[i][m] * a[k][m]).sum();
-            a[i][k] = if i == k { (a[k][k] - sum).sqrt() } else { (a[i][k] - sum) / a[k][k] };
-        }
-    }
-    for i in 0..n {
-        let sum: f64 = (0..i).map(|m| a[i][m] * b[m]).sum();
-        b[i] = (b[i] - sum) / a[i][i];
-    }
-    for i in (0..n).rev() {
-        let sum: f64 = (i + 1..n).map(|m| a[m][i] * b[m]).sum();
-        b[i] = (b[i] - sum) / a[i][i];
-    }
-    b
+    let factor = Mat::from_fn(n, n, |i, k| a[i][k]).llt(Side::Lower);
+    factor.map_or_else(
+        |_| vec![0.0; n],
+        |f| f.solve(&Col::from_fn(n, |i| b[i])).iter().copied().collect(),
+    )
 }
 
 #[cfg(test)]
