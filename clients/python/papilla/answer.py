@@ -207,13 +207,6 @@ def read(message: wire.Message, header: wire.Header, ready: dict[str, Any], tier
         header.sequence,
         header.status,
         header.client_time_us,
-        out_of_range="out_of_range" in header.flags,
-        no_contact="no_contact" in header.flags,
-        cut_off="cut_off" in header.flags,
-        unfamiliar="unfamiliar" in header.flags,
-        unsettled="unsettled" in header.flags,
-        not_tracked="not_tracked" in header.flags,
-        coarse_clock="coarse_clock" in header.flags,
         finger=header.finger,
         tier=tier,
         window=header.window,
@@ -221,6 +214,9 @@ def read(message: wire.Message, header: wire.Header, ready: dict[str, Any], tier
         queue_us=header.queue_us,
         infer_us=header.infer_us,
     )
+    # Each is a member of the same name.
+    for flag in header.flags:
+        setattr(answer, flag, True)
     if header.status != "ok":
         return answer
     for section in ready["sections"]:

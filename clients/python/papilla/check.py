@@ -108,16 +108,26 @@ def frame(values: ArrayLike, due: tuple[int, ...], kind: str, number: int, facto
     array = numbers(values, "frames")
     if array.shape != due:
         raise BadInput("frames", f"it has shape {array.shape}; {due} is due", number)
+    result = in_unit(array, kind, factor)
+    if not result.size:
+        return result
+    # A NaN among the values is the least and the greatest of them.
+    least, greatest = float(result.min()), float(result.max())
+    if not (math.isfinite(least) and math.isfinite(greatest)):
+        raise BadInput("frames", f"{_first(~np.isfinite(result), array)}; find out why, or leave the frame out", number)
+    if kind == "pressure" and least < 0.0 and len(due) == 2:
+        why = "skin is pressed, never pulled: take the sensor's offset away, then np.maximum(frames, 0)"
+        raise BadInput("frames", f"{_first(result < 0, array)}; {why}", number)
+    return result
+
+
+def in_unit(array: NDArray[Any], kind: str, factor: float) -> Map:
+    """The values of a frame as float32 in the protocol's unit."""
     if factor != 1.0:
         # Of a pose the place has a unit, the quaternion has none.
         array = array.astype(np.float64)
         array[..., : 3 if kind == "objects" else None] *= factor
     result: Map = array.astype(np.float32, copy=False)
-    if not np.isfinite(result).all():
-        raise BadInput("frames", f"{_first(~np.isfinite(result), array)}; find out why, or leave the frame out", number)
-    if kind == "pressure" and result.size and float(result.min()) < 0.0 and len(due) == 2:
-        why = "skin is pressed, never pulled: take the sensor's offset away, then np.maximum(frames, 0)"
-        raise BadInput("frames", f"{_first(result < 0, array)}; {why}", number)
     return result
 
 

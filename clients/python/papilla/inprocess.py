@@ -126,6 +126,23 @@ class LocalSession(Calls):
         deadline_us: int = 0,
     ) -> Future[Answer]:
         """Renders one frame; see `AsyncSession.send`. No deadline is missed here."""
+        return _done(self._press(pressure_pa, window, client_time_us, deadline_us))
+
+    def render(
+        self,
+        pressure_pa: ArrayLike | None = None,
+        *,
+        window: Window | None = None,
+        client_time_us: int | None = None,
+        deadline_us: int = 0,
+        timeout_s: float | None = None,
+    ) -> Answer:
+        """`send`, and its outcome. Nothing is waited for, and so no future made."""
+        return self._press(pressure_pa, window, client_time_us, deadline_us)
+
+    def _press(
+        self, pressure_pa: ArrayLike | None, window: Window | None, client_time_us: int | None, deadline_us: int
+    ) -> Answer:
         samples, window = check.pressure(pressure_pa, window)
         with self._lock:
             sequence, time_us = self._next(client_time_us)
@@ -137,11 +154,25 @@ class LocalSession(Calls):
         """Tells that tracking is lost; see `AsyncSession.send_not_tracked`."""
         with self._lock:
             sequence, time_us = self._next(None)
-            return self._frame(wire.encode_not_tracked(finger, sequence, time_us), b"", sequence, time_us, finger)
+            head = wire.encode_not_tracked(finger, sequence, time_us)
+            return _done(self._frame(head, b"", sequence, time_us, finger))
+
+    def touch(
+        self, poses: ArrayLike | None, *, finger: int = 0, net: NetForce | None = None, timeout_s: float | None = None
+    ) -> Answer:
+        """`send_poses`, and its outcome; see `Session.touch`."""
+        if poses is None:
+            return self.not_tracked(finger=finger)
+        return self._rows("objects", poses, finger, net, None)
 
     def _hand_over(
         self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
     ) -> Future[Answer]:
+        return _done(self._rows(kind, values, finger, net, client_time_us))
+
+    def _rows(
+        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
+    ) -> Answer:
         rows = np.atleast_2d(np.asarray(values, np.float32))
         with self._lock:
             sequence, time_us = self._next(client_time_us)
@@ -155,22 +186,24 @@ class LocalSession(Calls):
         self._sequence = (self._sequence + 1) % 2**32
         return self._sequence, time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
 
-    def _frame(
-        self, head: bytes, samples: bytes | memoryview, sequence: int, time_us: int, finger: int
-    ) -> Future[Answer]:
-        outcome: Future[Answer] = Future()
+    def _frame(self, head: bytes, samples: bytes | memoryview, sequence: int, time_us: int, finger: int) -> Answer:
         try:
             message = self._native.frame(head, samples)
         except Refused as refused:
             problem = Problem(refused.code, refused.message, refused.field)
             self._warned.once(problem.code, told_refused(problem))
-            outcome.set_result(Answer(sequence, "error", time_us, problem=problem, finger=finger))
-            return outcome
+            return Answer(sequence, "error", time_us, problem=problem, finger=finger)
         header, tier = wire.decode(message), self._ready["tier"]
         if "out_of_range" in header.flags:
             self._warned.once("out_of_range", told_beyond(tier))
-        outcome.set_result(answers.read(message, header, self._ready, tier))
-        return outcome
+        return answers.read(message, header, self._ready, tier)
+
+
+def _done(answer: Answer) -> Future[Answer]:
+    """A future that has its outcome."""
+    outcome: Future[Answer] = Future()
+    outcome.set_result(answer)
+    return outcome
 
 
 def _bytes(samples: NDArray[Any]) -> bytes | memoryview:

@@ -119,8 +119,9 @@ class Source:
                 f"times: half of the frames are {step} s apart or more; were ms or numbers of frames meant?"
             )
             _LOG.warning("%s", self.notes[-1])
+        self._looked_at = isinstance(frames, np.ndarray)
         if isinstance(frames, np.ndarray):
-            # All of it before the first frame leaves.
+            # All of it before the first frame leaves, and not once more when it does.
             greatest = 0.0
             for number, values in enumerate(frames):
                 looked_at = check.frame(values, terms.shape, terms.kind, number, self._factor)
@@ -143,7 +144,10 @@ class Source:
             self._next += 1
             if self.times_s is not None and number >= len(self.times_s):
                 raise BadInput("times", f"there are {len(self.times_s)}, and more frames than that")
-            looked_at = check.frame(values, self.terms.shape, self.terms.kind, number, self._factor)
+            if self._looked_at:
+                looked_at = check.in_unit(values, self.terms.kind, self._factor)
+            else:
+                looked_at = check.frame(values, self.terms.shape, self.terms.kind, number, self._factor)
             # Stills all have the same time, so that nothing counts as motion.
             time_us = 0
             if self.times_s is not None:
@@ -158,7 +162,7 @@ class Source:
     def _size(self, values: NDArray[np.float32]) -> float:
         if self.terms.kind == "objects":
             values = values[:, :3]
-        return float(np.abs(values).max()) if values.size else 0.0
+        return max(float(values.max()), -float(values.min())) if values.size else 0.0
 
 
 class _Meter:

@@ -78,6 +78,19 @@ def _head(
     Raises BadFrame for a number that has no room in it.
     """
     column, row, width, height = window
+    try:
+        return HEADER.pack(
+            b"PPL1", VERSION, kind, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
+            column, row, 0, 0, 0, flags, finger,
+        )  # fmt: skip
+    except struct.error:
+        _find_bad(window, client_time_us, deadline_us, finger)
+        raise
+
+
+def _find_bad(window: Window, client_time_us: int, deadline_us: int, finger: int) -> None:
+    """Raises BadFrame for the first number that has no room in a header."""
+    column, row, width, height = window
     side = 2**16 - 1
     for member, value, most in [
         ("finger", finger, 255), ("deadline_us", deadline_us, 2**32 - 1),
@@ -86,10 +99,6 @@ def _head(
     ]:  # fmt: skip
         if not isinstance(value, (int, np.integer)) or not 0 <= value <= most:
             raise BadFrame(member, value, most)
-    return HEADER.pack(
-        b"PPL1", VERSION, kind, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
-        column, row, 0, 0, 0, flags, finger,
-    )  # fmt: skip
 
 
 def parts(
@@ -161,6 +170,7 @@ FLAGS = {
     NOT_TRACKED: "not_tracked", 64: "coarse_clock",
 }  # fmt: skip
 """Bits of an answer's flags."""
+_NO_FLAGS: Final[frozenset[str]] = frozenset()
 
 
 def decode(message: Message) -> Header:
@@ -176,10 +186,10 @@ def decode(message: Message) -> Header:
         raise ValueError(f"not an answer of version {VERSION} of the protocol")
     if status >= len(STATUSES):
         raise ValueError(f"an answer with status {status}")
-    names = {name for bit, name in FLAGS.items() if flags & bit}
+    names = frozenset(name for bit, name in FLAGS.items() if flags & bit) if flags else _NO_FLAGS
     return Header(
         _NAMES[number], STATUSES[status], sequence, (column, row, width, height),
-        client_time_us, total_us, scale, queue_us, infer_us, tier, frozenset(names), finger,
+        client_time_us, total_us, scale, queue_us, infer_us, tier, names, finger,
     )  # fmt: skip
 
 
