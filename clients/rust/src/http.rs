@@ -46,9 +46,12 @@ pub fn atlas(server: &(impl ToAddress + ?Sized)) -> Result<Atlas, PapillaError> 
 /// # Errors
 /// As [`get`], or the atlas is damaged.
 pub fn atlas_of(server: &(impl ToAddress + ?Sized), finger: &str) -> Result<Atlas, PapillaError> {
-    // What is no name of a finger is refused, and stays one parameter.
-    let escaped: String = finger.bytes().map(|byte| format!("%{byte:02x}")).collect();
-    atlas_at(server, &format!("/v1/atlas?finger={escaped}"))
+    atlas_at(server, &format!("/v1/atlas?finger={}", escaped(finger)))
+}
+
+/// What is no name of a finger is refused, and stays one parameter.
+fn escaped(finger: &str) -> String {
+    finger.bytes().map(|byte| format!("%{byte:02x}")).collect()
 }
 
 fn atlas_at(server: &(impl ToAddress + ?Sized), path: &str) -> Result<Atlas, PapillaError> {
@@ -56,7 +59,8 @@ fn atlas_at(server: &(impl ToAddress + ?Sized), path: &str) -> Result<Atlas, Pap
     Ok(Atlas::from_json(&text)?)
 }
 
-/// SED of one pressure map (224 x 224, Pa), with the tier of that name or the service's default.
+/// SED of one pressure map (224 x 224, Pa) on the default finger, with the tier of that name or the
+/// service's default.
 ///
 /// # Errors
 /// Nobody listens, or the service refuses the map: [`PapillaError::code`] says why.
@@ -65,10 +69,32 @@ pub fn sed(
     pressure_pa: &[f32],
     tier: Option<&str>,
 ) -> Result<Rendered, PapillaError> {
+    sed_at(server, "/v1/sed", pressure_pa, tier)
+}
+
+/// The same on another finger of that service, by its name.
+///
+/// # Errors
+/// As [`sed`], or the service has no such finger.
+pub fn sed_of(
+    server: &(impl ToAddress + ?Sized),
+    finger: &str,
+    pressure_pa: &[f32],
+    tier: Option<&str>,
+) -> Result<Rendered, PapillaError> {
+    sed_at(server, &format!("/v1/sed?finger={}", escaped(finger)), pressure_pa, tier)
+}
+
+fn sed_at(
+    server: &(impl ToAddress + ?Sized),
+    path: &str,
+    pressure_pa: &[f32],
+    tier: Option<&str>,
+) -> Result<Rendered, PapillaError> {
     let address = server.to_address()?.plain()?;
     let mut payload = vec![0; 4 * pressure_pa.len()];
     SampleType::F32.encode(pressure_pa, 1.0, &mut payload).map_err(protocol)?;
-    let mut request = agent().post(address.http("/v1/sed"));
+    let mut request = agent().post(address.http(path));
     if let Some(authorization) = address.authorization() {
         request = request.header("authorization", authorization);
     }
@@ -112,4 +138,53 @@ fn body(
     }
     let unnamed = || Problem::new(ErrorCode::Internal, format!("status {status}"));
     Err(PapillaError::Refused(problem_of(&body).unwrap_or_else(unnamed)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        io::{BufRead, BufReader, Read, Write},
+        net::TcpListener,
+        thread,
+    };
+
+    use super::*;
+
+    /// The path of one request for a map, which is answered by zeros.
+    fn asked(ask: impl FnOnce(&str) -> Rendered) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let service = thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            let mut reader = BufReader::new(stream.try_clone().unwrap());
+            let mut lines = Vec::new();
+            loop {
+                let mut line = String::new();
+                reader.read_line(&mut line).unwrap();
+                if line.trim().is_empty() {
+                    break;
+                }
+                lines.push(line);
+            }
+            reader.read_exact(&mut vec![0; 4 * MAP_LEN]).unwrap();
+            let head = format!(
+                "HTTP/1.1 200 OK\r\nx-papilla-tier: own\r\ncontent-length: {}\r\n\r\n",
+                4 * MAP_LEN
+            );
+            stream.write_all(head.as_bytes()).unwrap();
+            stream.write_all(&vec![0; 4 * MAP_LEN]).unwrap();
+            lines[0].split(' ').nth(1).unwrap().to_owned()
+        });
+        assert_eq!(ask(&address).tier, "own");
+        service.join().unwrap()
+    }
+
+    #[test]
+    fn a_map_is_asked_of_the_finger_that_is_named() {
+        let zero = vec![0.0; MAP_LEN];
+        let plain = asked(|server| sed(server, &zero, None).unwrap());
+        assert_eq!(plain, "/v1/sed");
+        let named = asked(|server| sed_of(server, "my&finger", &zero, Some("own")).unwrap());
+        assert_eq!(named, "/v1/sed?finger=%6d%79%26%66%69%6e%67%65%72&tier=own");
+    }
 }

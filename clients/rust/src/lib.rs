@@ -28,7 +28,7 @@ pub use address::{Address, ToAddress};
 pub use answer::{Answer, Status};
 pub use dial::dial;
 pub use error::PapillaError;
-pub use http::{Rendered, atlas, atlas_of, get, sed};
+pub use http::{Rendered, atlas, atlas_of, get, sed, sed_of};
 pub use papilla_proto as proto;
 pub use session::{Frame, NetForce, Session};
 pub use skin::{Contact, Skin};

@@ -1,9 +1,9 @@
-//! Writes what `proto/conformance.json` and `proto/conformance-contact.json` expect anew, from the
+//! Writes what the files `proto/conformance*.json` expect anew, from the
 //! engine, the contact solver and the documentation's formulas. Inputs, and which numbers are asked
 //! for, are written by hand and stay.
 //!
 //! ```text
-//! conformance-record                                    both files, with models/
+//! conformance-record                                    all files, with models/
 //! conformance-record --contact-model FILE               the model that contact is tested with
 //! ```
 
@@ -22,10 +22,9 @@ fn main() -> anyhow::Result<()> {
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => {
             rewrite("proto/conformance.json", |file| Ok(Recorder::new(models)?.fill(file)?))?;
-            rewrite(
-                "proto/conformance-moving.json",
-                |file| Ok(Recorder::new(models)?.fill(file)?),
-            )?;
+            for path in ["proto/conformance-moving.json", "proto/conformance-fingers.json"] {
+                rewrite(path, |file| Ok(Recorder::new(models)?.fill(file)?))?;
+            }
             rewrite("proto/conformance-contact.json", |file| {
                 Ok(ContactRecorder::new(models)?.fill(file)?)
             })

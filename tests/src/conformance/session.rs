@@ -38,9 +38,20 @@ pub(super) struct Answer {
     tolerance: Vec<f64>,
 }
 
+/// Name and default tier of the finger that `clients/conformance/run --fingers` serves.
+const OTHER_FINGER: [&str; 2] = ["other", "half-space"];
+
+/// The default of the finger that a hello names.
+fn own_tier(hello: &Hello) -> Option<String> {
+    let [finger, tier] = OTHER_FINGER;
+    let first = hello.fingers.as_deref()?.first()?;
+    (first.name.as_deref() == Some(finger)).then(|| tier.to_owned())
+}
+
 impl Session {
     pub(super) fn new(hello: Hello) -> Result<Self, String> {
-        let tier = hello.tier.clone().ok_or("every hello of the script names its tier")?;
+        let tier = (hello.tier.clone().or_else(|| own_tier(&hello)))
+            .ok_or("every hello of the script names its tier, but for those of the other finger")?;
         let effects = hello.effects.iter().filter_map(|name| name.parse().ok()).collect();
         Ok(Self { hello, tier, effects, sent: Vec::new(), stress: None })
     }

@@ -66,6 +66,7 @@ fn compare(path: &str, measured: bool, found: &Value, due: &Value) -> usize {
 fn the_committed_scripts_are_what_engine_and_formulas_say() {
     committed_is_recorded("proto/conformance.json", 250);
     committed_is_recorded("proto/conformance-moving.json", 60);
+    committed_is_recorded("proto/conformance-fingers.json", 10);
 }
 
 fn committed_is_recorded(path: &str, least: usize) {

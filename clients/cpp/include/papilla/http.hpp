@@ -76,13 +76,25 @@ inline HttpAnswer http(const std::string& url, const std::string& method, const 
 }
 
 /// SED (J/m3) of one pressure map (Pa), both 224 x 224, row by row. Empty if refused: `answer`,
-/// if given, says why, and otherwise which tier rendered (`x-papilla-tier`).
+/// if given, says why, and otherwise which tier rendered (`x-papilla-tier`). `finger` by name, or the
+/// default one.
 inline std::vector<float> sed(const std::vector<float>& pressure_pa, const std::string& url = "127.0.0.1:7224",
-                              const std::string& tier = {}, HttpAnswer* answer = nullptr) {
+                              const std::string& tier = {}, HttpAnswer* answer = nullptr,
+                              const std::string& finger = {}) {
   std::string body(4 * pressure_pa.size(), '\0');
   encode_samples(SampleType::f32, pressure_pa.data(), pressure_pa.size(), 1.0F,
                  reinterpret_cast<std::uint8_t*>(&body[0]));
-  HttpAnswer got = http(url, "POST", "/v1/sed" + (tier.empty() ? "" : "?tier=" + tier), body,
+  std::string path = "/v1/sed";
+  if (!tier.empty()) path += "?tier=" + tier;
+  if (!finger.empty()) {
+    path += tier.empty() ? "?finger=" : "&finger=";
+    // What is no name of a finger is refused, and stays one parameter.
+    for (const unsigned char byte : finger) {
+      const char* digits = "0123456789abcdef";
+      path += {'%', digits[byte >> 4], digits[byte & 15]};
+    }
+  }
+  HttpAnswer got = http(url, "POST", path, body,
                         "Content-Type: application/octet-stream\r\nAccept: application/octet-stream\r\n");
   std::vector<float> map;
   if (got.status == 200 && got.body.size() == 4 * map_len) {
