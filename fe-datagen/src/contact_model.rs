@@ -131,7 +131,8 @@ fn require_vertices(own: &Atlas, other: &Atlas) -> anyhow::Result<()> {
 /// Where vertices of the template's skin lie: it is its own mirror image, as a finger with a skin
 /// of its own is not.
 fn template_places(shape: &FingertipShape) -> anyhow::Result<Vec<[f32; 3]>> {
-    let template = FingertipShape { offset: None, ..shape.clone() };
+    let template =
+        FingertipShape { offset: None, epidermis_map: None, dermis_map: None, ..shape.clone() };
     let body = Body::even(&template, &TissueTable::default(), Density::Medium)?;
     let (atlas, _) = body.atlas().context("the finger has no atlas")??;
     Ok(atlas.patch(Patch::Skin).positions_mm.clone())

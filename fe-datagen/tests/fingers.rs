@@ -177,6 +177,9 @@ fn a_scan_that_is_refused_leaves_nothing_behind() {
     let e = refused(folder.path(), &[&SCAN[..], &["mine", "--length", "60"]].concat());
     assert!(e.contains("scan more of it"), "{e}");
     assert_eq!(names(), 1);
+    let e = refused(folder.path(), &[&SCAN[..], &["mine", "--dermis", "thin.csv"]].concat());
+    assert!(e.contains("thin.csv is no number of mm, and no file"), "{e}");
+    assert_eq!(names(), 1);
     std::fs::create_dir(folder.path().join("mine")).unwrap();
     std::fs::write(folder.path().join("mine/notes.txt"), "keep me").unwrap();
     let e = refused(folder.path(), &[&SCAN[..], &["mine"]].concat());
@@ -194,6 +197,14 @@ fn a_scan_becomes_a_finger_that_is_pressed() {
     let fit: Value = serde_json::from_str(&text).unwrap();
     assert!(fit["skin_rms_mm"].as_f64().unwrap() < 0.03, "{fit}");
     assert!(fit["offset_mm_max"].as_f64().unwrap() > 0.05, "the scan is bent: {fit}");
+    // With a map of the dermis, from a file.
+    let line = format!("0.8{}\n", ", 0.8".repeat(23));
+    std::fs::write(folder.path().join("dermis.csv"), line.repeat(17)).unwrap();
+    let mapped = ["mapped", "--dermis", "dermis.csv", "--epidermis", "0.3"];
+    done(folder.path(), &[&SCAN[..], &mapped].concat());
+    let shape = Finger::read(&folder.path().join("mapped")).unwrap().shape;
+    assert_eq!((shape.epidermis_mm, shape.dermis_map.is_some()), (0.3, true));
+    assert!((shape.dermis_mm - 0.8).abs() < 1e-12, "{}", shape.dermis_mm);
     let mine = folder.path().join("fingers/mine");
     let finger = Finger::read(&mine).unwrap();
     assert_eq!(fit["finger_sha256"], finger.sha256());

@@ -172,6 +172,19 @@ pub enum ScanError {
         /// The place.
         at_mm: [f64; 3],
     },
+    /// A nail that is not where a nail is.
+    #[error(
+        "the nail's surface is not on the back of the finger at {} of the finger's frame, where it may be {most_mm} mm \
+         from the skin at most: it has to be in the same frame and unit as the finger's, and --nail has to point \
+         out of it",
+        place(at_mm)
+    )]
+    NailElsewhere {
+        /// The place.
+        at_mm: [f64; 3],
+        /// How far it may be from the skin.
+        most_mm: f64,
+    },
     /// The finger that came out makes no sense.
     #[error("the fitted finger cannot be used: {0}")]
     Finger(#[from] FingerError),

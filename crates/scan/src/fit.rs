@@ -8,7 +8,7 @@ use crate::{ScanError, Surface};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::geometry::fingertip::offset::at_uv;
 use papilla_fingertip::mesh::fingertip::check_elements;
-use papilla_fingertip::scene::finger::{FIELDS, SKIN_FILE, Source};
+use papilla_fingertip::scene::finger::{FIELDS, SKIN_FILE, Source, Thickness};
 use papilla_fingertip::scene::{Finger, FingerError};
 use papilla_sdf::vector::{cross, dot, minus, norm};
 use papilla_sdf::{MeshDistance, Placement};
@@ -29,6 +29,11 @@ const MISSING: f64 = 0.05;
 const FAR_MM: f64 = 0.3;
 /// Beyond this distance from the tip nothing is looked at, mm.
 const BEYOND_MM: f64 = 60.0;
+/// Longest way from the tip to the thickest section, in widths; the default finger has 0.65. Many
+/// hand models grow up to the knuckle, and without a bound no body would be left behind that section.
+const CAP_MAX: f64 = 0.85;
+/// Shortest way, in widths.
+const CAP_MIN: f64 = 0.15;
 /// How much worse the template has to fit the other way round, to know where the nail is.
 const WORSE: f64 = 1.2;
 
@@ -46,11 +51,18 @@ pub struct Where {
 }
 
 /// What is not to be seen in a surface of the skin.
+#[derive(Clone, Default)]
 pub struct Inside<'a> {
     /// Layers, bone, nail and tissues by number; in proportion to the default finger's if not given.
     pub numbers: Option<&'a Finger>,
     /// The bone's surface, in the same frame.
     pub bone: Option<&'a Surface>,
+    /// The nail plate's surface, in the same frame.
+    pub nail: Option<&'a Surface>,
+    /// Thickness of the epidermis, if it is known.
+    pub epidermis: Option<Thickness>,
+    /// Thickness of the dermis, if it is known.
+    pub dermis: Option<Thickness>,
 }
 
 /// A fitted finger and how well it fits.
@@ -103,15 +115,38 @@ pub fn fit(scan: &Surface, at: &Where, inside: &Inside<'_>) -> Result<Fitted, Sc
         return Err(FingerError::Offset { path: SKIN_FILE.into(), source }.into());
     }
     say(&skin, &mut done);
+    if shape.cap_length_mm > 0.999 * CAP_MAX * shape.width_mm {
+        done.push(format!(
+            "the surface grows thicker up to its end: the thickest section was taken to be {:.1} mm behind the \
+             tip, {CAP_MAX} times the width",
+            shape.cap_length_mm
+        ));
+    }
     let mut finger = numbered(shape, inside.numbers, &mut done);
     finger.shape.offset.clone_from(&skin.offset);
     if let Some(bone) = inside.bone {
         let bone = Placed::new(&clean(bone, axis)?.surface, placement)?;
         crate::bone::fit(&mut finger.shape, &bone, &surface, &mut done)?;
     }
+    if let Some(nail) = inside.nail {
+        crate::nail::fit(&mut finger.shape, nail, &placement, &surface, &mut done)?;
+    }
+    measured_layers(&mut finger.shape, inside, &mut done);
     finger.validate()?;
     let scaled_jacobian_min = check_elements(&finger.shape)?;
     Ok(Fitted { finger, surface, template_rms_mm: rms, skin, scaled_jacobian_min, done })
+}
+
+/// Puts in the layers' thickness that is known.
+fn measured_layers(shape: &mut FingertipShape, inside: &Inside<'_>, done: &mut Vec<String>) {
+    if let Some(epidermis) = inside.epidermis.clone() {
+        (shape.epidermis_mm, shape.epidermis_map) = epidermis.parts();
+        done.push("the epidermis is as thick as was given".into());
+    }
+    if let Some(dermis) = inside.dermis.clone() {
+        (shape.dermis_mm, shape.dermis_map) = dermis.parts();
+        done.push("the dermis is as thick as was given".into());
+    }
 }
 
 /// Says where the skin is not the surface.
@@ -325,17 +360,21 @@ impl Template {
         parameters.extend([
             length(shape.width_mm, "width_mm"),
             length(shape.height_mm, "height_mm"),
-            length(shape.cap_length_mm, "cap_length_mm"),
+            // In widths.
+            Parameter {
+                start: (shape.cap_length_mm / shape.width_mm).clamp(CAP_MIN, CAP_MAX),
+                range: [CAP_MIN, CAP_MAX],
+                step: 1e-4,
+            },
             length(shape.cap_exponent, "cap_exponent"),
             length(shape.crease_depth_mm, "crease_depth_mm"),
         ]);
-        let most = shape.length_mm - 1.0;
-        parameters[8].range[1] = parameters[8].range[1].min(most);
-        parameters[8].start = parameters[8].start.min(most);
+        let cap = range("cap_length_mm");
+        let most = cap[1].min(shape.length_mm - 1.0);
         let shaped = |x: &[f64]| FingertipShape {
             width_mm: x[6],
             height_mm: x[7],
-            cap_length_mm: x[8],
+            cap_length_mm: (x[8] * x[6]).min(most).max(cap[0]),
             cap_exponent: x[9],
             crease_depth_mm: x[10].min(0.45 * x[7]),
             ..shape.clone()

@@ -9,6 +9,7 @@ pub mod clean;
 mod error;
 pub mod fit;
 mod least_squares;
+mod nail;
 pub mod picture;
 pub mod placed;
 pub mod read;

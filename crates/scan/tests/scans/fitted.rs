@@ -2,12 +2,14 @@
 
 use crate::surfaces::{FINE, NOTHING, fit_of, rings, scanned, skin, where_it_is};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
+use papilla_fingertip::geometry::fingertip::LayerMap;
 use papilla_fingertip::geometry::fingertip::offset::at_uv;
 use papilla_fingertip::mesh::fingertip::{Density, Order};
-use papilla_fingertip::scene::{Geometry, Motion, Pose, Scene};
+use papilla_fingertip::scene::finger::Thickness;
+use papilla_fingertip::scene::{Finger, Geometry, Motion, Pose, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_scan::fit::{Inside, Where, fit};
-use papilla_scan::picture;
+use papilla_scan::{Surface, picture};
 
 /// Force at the end of a press of a coarse mesh, N.
 fn force_n(shape: &FingertipShape) -> f64 {
@@ -99,6 +101,29 @@ fn a_small_and_a_wide_finger_are_found() {
     }
 }
 
+#[test]
+fn a_finger_that_grows_up_to_the_knuckle_has_its_thickest_section_near_the_tip() {
+    // As the fingers of hand models do: a tube without a crease, a fifth wider at its far end.
+    let tube = FingertipShape {
+        length_mm: 42.0,
+        width_mm: 14.0,
+        height_mm: 12.0,
+        cap_length_mm: 7.0,
+        crease_depth_mm: 0.0,
+        ..FingertipShape::default()
+    };
+    let surface = rings(FINE, |uv| {
+        let [x, y, z] = tube.template_skin(at_uv(uv));
+        let wider = 1.0 + 0.22 * ((x - 7.0) / 35.0).max(0.0);
+        [x, wider * y, wider * z - 0.06 * x]
+    });
+    let fitted = fit_of(&scanned(surface)).unwrap();
+    let found = &fitted.finger.shape;
+    assert!(found.cap_length_mm <= 0.85 * found.width_mm + 1e-9, "{}", found.cap_length_mm);
+    assert!(fitted.skin.rms_mm < 0.05, "{}", fitted.skin.rms_mm);
+    assert!(fitted.done.iter().any(|d| d.contains("grows thicker")), "{:?}", fitted.done);
+}
+
 /// A finger that the template alone is not: bent to the side and downward, with a swelling.
 fn bent([u, v]: [f64; 2]) -> [f64; 3] {
     let shape = FingertipShape::default();
@@ -145,6 +170,58 @@ fn the_same_surface_gives_the_same_bits() {
 }
 
 #[test]
+fn a_nail_is_taken_from_its_surface() {
+    let truth = FingertipShape::default();
+    // A plate 9 mm wide that begins 1 mm before the tip; an open patch above the skin.
+    let plate = |[u, v]: [f64; 2]| {
+        let y = 9.0 * (u - 0.5);
+        let x = 14.0 * v - 1.0;
+        [x, y, truth.on_skin([x.max(3.0), y, 6.0])[2] + 0.4]
+    };
+    let count = 8;
+    let mut nail = Surface { vertices_mm: vec![], triangles: vec![] };
+    for i in 0..=count {
+        let at = |k: u32| f64::from(k) / f64::from(count);
+        nail.vertices_mm.extend((0..=count).map(|j| plate([at(j), at(i)])));
+    }
+    for n in (0..count * (count + 1)).filter(|n| n % (count + 1) < count) {
+        nail.triangles.extend([[n, n + 1, n + count + 1], [n + 1, n + count + 2, n + count + 1]]);
+    }
+    let nail = scanned(nail);
+    let inside = Inside { nail: Some(&nail), ..NOTHING };
+    let fitted = fit(&scanned(skin(&truth, FINE)), &where_it_is(), &inside).unwrap();
+    let found = &fitted.finger.shape;
+    assert_near(found.nail_mm[0], 9.0, 0.1, "width");
+    assert_near(found.nail_mm[1], 12.9, 0.2, "length");
+    assert_near(found.nail_tip_mm, 0.1, 1e-9, "free edge");
+    assert!(fitted.done.iter().any(|d| d.contains("the nail was taken")), "{:?}", fitted.done);
+    // Of another finger, 20 mm away.
+    let mut away = nail.clone();
+    away.vertices_mm.iter_mut().for_each(|p| p[1] += 20.0);
+    let inside = Inside { nail: Some(&away), ..NOTHING };
+    let e = fit(&scanned(skin(&truth, FINE)), &where_it_is(), &inside).err().unwrap();
+    assert!(e.to_string().contains("the nail's surface is not on the back"), "{e}");
+}
+
+#[test]
+fn a_map_of_the_dermis_is_taken_as_it_is() {
+    let row = |i: u32| (0..24).map(|j| 0.8 + 0.01 * f64::from(i) + 0.001 * f64::from(j)).collect();
+    let map = LayerMap::new((0..17).map(row).collect()).unwrap();
+    let inside = Inside {
+        dermis: Some(Thickness::Map(map.clone())),
+        epidermis: Some(Thickness::Number(0.3)),
+        ..NOTHING
+    };
+    let fitted =
+        fit(&scanned(skin(&FingertipShape::default(), FINE)), &where_it_is(), &inside).unwrap();
+    let shape = &fitted.finger.shape;
+    assert_eq!((shape.epidermis_mm, shape.dermis_map.as_deref()), (0.3, Some(&map)));
+    let text = fitted.finger.to_toml();
+    let read = Finger::parse(std::path::Path::new("finger.toml"), text).unwrap();
+    assert_eq!(read.shape.dermis_map.as_deref(), Some(&map));
+}
+
+#[test]
 fn a_bone_is_fitted_to_its_surface() {
     let truth = FingertipShape {
         bone_tuft_mm: [6.5, 3.4],
@@ -153,7 +230,7 @@ fn a_bone_is_fitted_to_its_surface() {
         ..FingertipShape::default()
     };
     let bone = scanned(rings([40, 40], |uv| truth.bone(at_uv(uv))));
-    let inside = Inside { numbers: None, bone: Some(&bone) };
+    let inside = Inside { bone: Some(&bone), ..NOTHING };
     let fitted = fit(&scanned(skin(&truth, FINE)), &where_it_is(), &inside).unwrap();
     let found = &fitted.finger.shape;
     assert_near(found.bone_offset_mm, 1.4, 0.1, "offset");

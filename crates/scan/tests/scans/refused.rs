@@ -144,12 +144,12 @@ fn a_bone_outside_of_the_skin_is_named() {
         let [x, y, z] = shape.bone(at_uv(uv));
         [x, y + 6.0, z]
     }));
-    let e = fit(&finger(), &where_it_is(), &Inside { numbers: None, bone: Some(&bone) });
+    let e = fit(&finger(), &where_it_is(), &Inside { bone: Some(&bone), ..NOTHING });
     let e = e.err().unwrap();
     assert!(matches!(e, ScanError::BoneOutside { out_mm, .. } if out_mm > 1.0), "{e}");
     let mut numbers = Finger::usual();
     numbers.shape.bone_base_mm = [19.0, 6.5];
-    let e = fit(&finger(), &where_it_is(), &Inside { numbers: Some(&numbers), bone: None });
+    let e = fit(&finger(), &where_it_is(), &Inside { numbers: Some(&numbers), ..NOTHING });
     let e = e.err().unwrap().to_string();
     assert!(e.contains("the bone is only") && e.contains("below the skin at x ="), "{e}");
 }
@@ -160,7 +160,7 @@ fn layers_thicker_than_the_pulp_are_named() {
     numbers.shape.dermis_mm = 3.0;
     numbers.shape.epidermis_mm = 1.5;
     numbers.shape.bone_offset_mm = 0.5;
-    let e = fit(&finger(), &where_it_is(), &Inside { numbers: Some(&numbers), bone: None });
+    let e = fit(&finger(), &where_it_is(), &Inside { numbers: Some(&numbers), ..NOTHING });
     let e = e.err().unwrap().to_string();
     assert!(e.contains("4.50 mm thick") && e.contains("they may take"), "{e}");
 }

@@ -66,7 +66,8 @@ pub(crate) fn where_it_is() -> Where {
     }
 }
 
-pub(crate) const NOTHING: Inside<'_> = Inside { numbers: None, bone: None };
+pub(crate) const NOTHING: Inside<'_> =
+    Inside { numbers: None, bone: None, nail: None, epidermis: None, dermis: None };
 
 pub(crate) fn fit_of(surface: &Surface) -> Result<Fitted, ScanError> {
     fit(surface, &where_it_is(), &NOTHING)

@@ -91,7 +91,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     });
     let number = |f: &papilla_fingertip::scene::finger::Field| Number {
         key: f.dotted(),
-        value: f.written(shape),
+        value: f.shown(shape),
         unit: f.unit,
         default: f.written(&usual),
         range: f.range,

@@ -1,8 +1,9 @@
 //! `finger from-surface`: a finger from a scan.
 
 use anyhow::Context as _;
+use papilla_fingertip::geometry::fingertip::LayerMap;
 use papilla_fingertip::scene::Finger;
-use papilla_fingertip::scene::finger::{FINGER_FILE, SKIN_FILE, Source};
+use papilla_fingertip::scene::finger::{FINGER_FILE, SKIN_FILE, Source, Thickness};
 use papilla_output::atomic;
 use papilla_scan::fit::{Fitted, Inside, Where, fit};
 use papilla_scan::{Unit, picture, read};
@@ -47,6 +48,15 @@ pub(super) struct Args {
     /// Surface of the bone, in the same frame and unit.
     #[arg(long, value_name = "SURFACE")]
     bone: Option<PathBuf>,
+    /// Surface of the nail plate, in the same frame and unit; it need not be closed.
+    #[arg(long, value_name = "SURFACE")]
+    nail_surface: Option<PathBuf>,
+    /// Thickness of the epidermis, mm, or a CSV file of 17 rows over v and 24 columns over u.
+    #[arg(long, value_name = "MM|CSV")]
+    epidermis: Option<String>,
+    /// The same of the dermis.
+    #[arg(long, value_name = "MM|CSV")]
+    dermis: Option<String>,
     /// Whose finger it is, for finger.toml.
     #[arg(long, default_value = "")]
     who: String,
@@ -76,6 +86,16 @@ fn vector(text: &str) -> Result<Vector, String> {
         }
         _ => Err("has to be three numbers with commas between them, such as 0,0,-1".into()),
     }
+}
+
+/// A number of mm, or a map from a file.
+fn thickness(text: &str) -> anyhow::Result<Thickness> {
+    if let Ok(mm) = text.parse() {
+        return Ok(Thickness::Number(mm));
+    }
+    let rows = papilla_json::read_text(Path::new(text))
+        .with_context(|| format!("{text} is no number of mm, and no file that can be read"))?;
+    Ok(Thickness::Map(LayerMap::from_csv(&rows).with_context(|| text.to_owned())?))
 }
 
 fn unit(name: &str) -> Result<Unit, String> {
@@ -117,7 +137,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         nail: args.nail.map(|n| n.0),
         length_mm: args.length,
     };
-    let inside = Inside { numbers: numbers.as_ref(), bone: bone.as_ref() };
+    let nail =
+        args.nail_surface.as_deref().map(|path| read::surface(path, args.unit)).transpose()?;
+    let inside = Inside {
+        numbers: numbers.as_ref(),
+        bone: bone.as_ref(),
+        nail: nail.as_ref(),
+        epidermis: args.epidermis.as_deref().map(thickness).transpose()?,
+        dermis: args.dermis.as_deref().map(thickness).transpose()?,
+    };
     let mut fitted =
         fit(&surface, &at, &inside).with_context(|| args.surface.display().to_string())?;
     let file = args.surface.file_name().map(|n| n.to_string_lossy().into_owned());

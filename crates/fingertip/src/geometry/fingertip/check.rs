@@ -221,8 +221,8 @@ impl FingertipShape {
     }
 
     /// Checks that the bone lies below the skin everywhere, and that epidermis and dermis fit
-    /// between them under the pad. Elsewhere they may be squeezed: under the nail and at the tip
-    /// skin is thinner.
+    /// between them under the middle of the pad; those of a map, under all of the pad. Elsewhere they
+    /// may be squeezed: under the nail and at the tip skin is thinner.
     ///
     /// # Errors
     /// [`FingertipShapeError::BoneTooClose`] or [`FingertipShapeError::LayersTooThick`] with the
@@ -242,23 +242,28 @@ impl FingertipShape {
         if let Some((_, error)) = worst {
             return Err(error);
         }
-        let pad = SurfaceParameter::Body([0.0, -1.0], 0.0);
-        let (skin, bone, normal) = (self.skin(pad), self.bone(pad), self.skin_normal_at(pad));
-        let gap_mm: f64 = (0..3).map(|i| (skin[i] - bone[i]) * normal[i]).sum();
-        let (layers_mm, most_mm) = (self.epidermis_mm + self.dermis_mm, SKIN_SHARE_MAX * gap_mm);
-        if layers_mm > most_mm {
-            let [x_mm, y_mm, z_mm] = skin;
-            let error = FingertipShapeError::LayersTooThick {
-                layers_mm,
-                gap_mm,
-                most_mm,
-                x_mm,
-                y_mm,
-                z_mm,
-            };
-            return Err(error);
+        let mut places = vec![SurfaceParameter::Body([0.0, -1.0], 0.0)];
+        if self.epidermis_map.is_some() || self.dermis_map.is_some() {
+            let all = (0..=STEPS * STEPS).map(|k| {
+                let [i, j] = [k / STEPS, k % STEPS].map(|n| f64::from(n) / f64::from(STEPS));
+                at_uv([j, 2.0 * i])
+            });
+            places.extend(all.filter(|s| self.region(*s) == "pad"));
         }
-        Ok(())
+        let too_thick = places.into_iter().filter_map(|s| self.too_thick(s));
+        too_thick.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(Ok(()), |(_, error)| Err(error))
+    }
+
+    /// By how much epidermis and dermis are too thick at a place, mm; none if they are not.
+    fn too_thick(&self, s: SurfaceParameter) -> Option<(f64, FingertipShapeError)> {
+        let (skin, bone, normal) = (self.skin(s), self.bone(s), self.skin_normal_at(s));
+        let gap_mm: f64 = (0..3).map(|i| (skin[i] - bone[i]) * normal[i]).sum();
+        let (layers_mm, most_mm) =
+            (self.thickness_mm(s).iter().sum::<f64>(), SKIN_SHARE_MAX * gap_mm);
+        let [x_mm, y_mm, z_mm] = skin;
+        let error =
+            FingertipShapeError::LayersTooThick { layers_mm, gap_mm, most_mm, x_mm, y_mm, z_mm };
+        (layers_mm > most_mm).then_some((layers_mm - most_mm, error))
     }
 
     /// Where a place of the skin is on the finger, in words.

@@ -13,9 +13,11 @@
 //! along the template's normals, and the layers below lie along the normals of its own skin.
 
 mod check;
+mod layer_map;
 pub mod offset;
 
 pub use check::{FingertipShapeError, SCALED_JACOBIAN_MIN};
+pub use layer_map::{LayerMap, LayerMapError};
 pub use offset::{SkinOffset, SkinOffsetError};
 
 use check::GAP_MIN_MM;
@@ -71,6 +73,13 @@ pub struct FingertipShape {
     /// How far the skin lies from this template's; a finger's own file gives it.
     #[serde(skip)]
     pub offset: Option<Arc<SkinOffset>>,
+    /// How thick the epidermis is where; a finger's own file gives it. `epidermis_mm` is its
+    /// thickness in the middle of the pad then.
+    #[serde(skip)]
+    pub epidermis_map: Option<Arc<LayerMap>>,
+    /// The same of the dermis.
+    #[serde(skip)]
+    pub dermis_map: Option<Arc<LayerMap>>,
 }
 
 impl Default for FingertipShape {
@@ -96,6 +105,8 @@ impl Default for FingertipShape {
             nail_thickness_mm: 0.5,
             bone_cortex_mm: 0.75,
             offset: None,
+            epidermis_map: None,
+            dermis_map: None,
         }
     }
 }
@@ -290,6 +301,13 @@ impl FingertipShape {
         }
     }
 
+    /// How thick epidermis and dermis are below a skin point where nothing squeezes them, mm.
+    #[must_use]
+    pub fn thickness_mm(&self, s: SurfaceParameter) -> [f64; 2] {
+        let of = |map: &Option<Arc<LayerMap>>, usual: f64| map.as_ref().map_or(usual, |m| m.at(s));
+        [of(&self.epidermis_map, self.epidermis_mm), of(&self.dermis_map, self.dermis_mm)]
+    }
+
     /// Points that bound the layers below a skin point: skin,
     /// epidermis-dermis interface, dermis-fat interface, bone.
     ///
@@ -304,10 +322,11 @@ impl FingertipShape {
             let [x_mm, y_mm, z_mm] = skin;
             return Err(FingertipShapeError::BoneTooClose { gap_mm: gap, x_mm, y_mm, z_mm });
         }
-        let total = self.epidermis_mm + self.dermis_mm;
+        let [epidermis, dermis] = self.thickness_mm(s);
+        let total = epidermis + dermis;
         let squeeze = soft_min(1.0, SKIN_SHARE_MAX * gap / total);
         let inward = |depth: f64| std::array::from_fn(|i| skin[i] - depth * normal[i]);
-        Ok([skin, inward(self.epidermis_mm * squeeze), inward(total * squeeze), bone])
+        Ok([skin, inward(epidermis * squeeze), inward(total * squeeze), bone])
     }
 
     /// Whether a skin point lies under the nail plate.

@@ -12,7 +12,7 @@ const HALVINGS: u32 = 10;
 /// What to say of a shape whose mesh has elements that are inside out.
 pub(crate) fn blame(shape: &FingertipShape, parts: Parts) -> FingertipShapeError {
     if let Err(distorted @ FingertipShapeError::Distorted { .. }) = check_elements(shape)
-        && shape.offset.is_some()
+        && (shape.offset.is_some() || shape.epidermis_map.is_some() || shape.dermis_map.is_some())
     {
         return distorted;
     }
@@ -63,7 +63,8 @@ fn culprit(
             None => *place = Value::Float(value),
         }
         let changed: FingertipShape = table.try_into().ok()?;
-        Some(FingertipShape { offset: shape.offset.clone(), ..changed })
+        let FingertipShape { offset, epidermis_map, dermis_map, .. } = shape.clone();
+        Some(FingertipShape { offset, epidermis_map, dermis_map, ..changed })
     };
     let sound = |value: f64| with(value).is_some_and(|shape| is_sound(&shape, parts));
     let (value, usual) = (number(shape)?, number(&FingertipShape::default())?);

@@ -109,7 +109,7 @@ impl FingerError {
     /// The same at its line of the file, if it has one.
     pub(super) fn at(self, origin: &Origin) -> Self {
         let field = match &self {
-            Self::Range { field, .. } => field.clone(),
+            Self::Range { field, .. } => field.split('[').next().unwrap_or_default().to_owned(),
             Self::Tissue(e) => material_field(e).replacen("materials.", "tissue.", 1),
             Self::Shape(e) => {
                 let name = e.field();

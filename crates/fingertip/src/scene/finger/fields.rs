@@ -1,6 +1,6 @@
 //! The numbers of a finger's file: each with its unit, its default, its range and what it is.
 
-use crate::geometry::fingertip::FingertipShape;
+use crate::geometry::fingertip::{FingertipShape, LayerMap};
 
 /// A number, or several that belong together.
 pub struct Field {
@@ -30,8 +30,11 @@ impl Field {
             "cap_length_mm" => vec![s.cap_length_mm],
             "cap_exponent" => vec![s.cap_exponent],
             "crease_depth_mm" => vec![s.crease_depth_mm],
-            "epidermis_mm" => vec![s.epidermis_mm],
-            "dermis_mm" => vec![s.dermis_mm],
+            "epidermis_mm" | "dermis_mm" => match self.map(s) {
+                Some(map) => map.rows_mm().concat(),
+                None if self.shape == "dermis_mm" => vec![s.dermis_mm],
+                None => vec![s.epidermis_mm],
+            },
             "bone_tip_mm" => vec![s.bone_tip_mm],
             "bone_cap_mm" => vec![s.bone_cap_mm],
             "bone_offset_mm" => vec![s.bone_offset_mm],
@@ -46,6 +49,30 @@ impl Field {
         }
     }
 
+    /// The map of a layer that has one.
+    #[must_use]
+    pub fn map<'a>(&self, shape: &'a FingertipShape) -> Option<&'a LayerMap> {
+        match self.shape {
+            "epidermis_mm" => shape.epidermis_map.as_deref(),
+            "dermis_mm" => shape.dermis_map.as_deref(),
+            _ => None,
+        }
+    }
+
+    /// The values for people: of a map, its least and greatest.
+    #[must_use]
+    pub fn shown(&self, shape: &FingertipShape) -> String {
+        if self.map(shape).is_none() {
+            return self.written(shape);
+        }
+        let values = self.values(shape);
+        let [low, high] = [
+            values.iter().copied().fold(f64::INFINITY, f64::min),
+            values.iter().copied().fold(0.0, f64::max),
+        ];
+        format!("map, {low:?} to {high:?}")
+    }
+
     /// As the file names it.
     #[must_use]
     pub fn dotted(&self) -> String {
@@ -55,6 +82,10 @@ impl Field {
     /// The values as TOML.
     #[must_use]
     pub fn written(&self, shape: &FingertipShape) -> String {
+        if let Some(map) = self.map(shape) {
+            let rows = map.rows_mm().iter().map(|row| format!("    {row:?},\n"));
+            return format!("[\n{}]", rows.collect::<String>());
+        }
         match self.values(shape)[..] {
             [one] => format!("{one:?}"),
             ref several => format!("{several:?}"),

@@ -1,7 +1,7 @@
 //! The tables of a finger's file, and how it is written.
 
 use super::{FIELDS, Finger, SKIN_FILE};
-use crate::geometry::fingertip::{FingertipShape, SkinOffset};
+use crate::geometry::fingertip::{FingertipShape, LayerMap, SkinOffset, SurfaceParameter};
 use crate::materials::MaterialSpec;
 use crate::scene::materials::{MaterialSet, TissueTable};
 use crate::tissue::Tissue;
@@ -65,10 +65,74 @@ table!(Shape {
     crease_depth_mm: crease_depth_mm: f64,
 }, skin: Option<PathBuf>);
 
-table!(Layers {
-    epidermis_mm: epidermis_mm: f64,
-    dermis_mm: dermis_mm: f64,
-});
+/// Thickness of a layer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Thickness {
+    /// Everywhere, mm.
+    Number(f64),
+    /// Over (u, v).
+    Map(LayerMap),
+}
+
+impl Thickness {
+    /// The thickness in the middle of the pad, mm, and the map.
+    #[must_use]
+    pub fn parts(self) -> (f64, Option<Arc<LayerMap>>) {
+        match self {
+            Self::Number(mm) => (mm, None),
+            Self::Map(map) => {
+                (map.at(SurfaceParameter::Body([0.0, -1.0], 0.0)), Some(Arc::new(map)))
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Thickness {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> serde::de::Visitor<'de> for Visitor {
+            type Value = Thickness;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number of mm, or a map: rows of numbers over v and u")
+            }
+
+            fn visit_f64<E: serde::de::Error>(self, mm: f64) -> Result<Thickness, E> {
+                Ok(Thickness::Number(mm))
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, mm: i64) -> Result<Thickness, E> {
+                Ok(Thickness::Number(mm as f64))
+            }
+
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(
+                self,
+                rows: A,
+            ) -> Result<Thickness, A::Error> {
+                let rows = Vec::deserialize(serde::de::value::SeqAccessDeserializer::new(rows))?;
+                LayerMap::new(rows).map(Thickness::Map).map_err(serde::de::Error::custom)
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Layers {
+    epidermis_mm: Thickness,
+    dermis_mm: Thickness,
+}
+
+impl Default for Layers {
+    fn default() -> Self {
+        let FingertipShape { epidermis_mm, dermis_mm, .. } = FingertipShape::default();
+        Self {
+            epidermis_mm: Thickness::Number(epidermis_mm),
+            dermis_mm: Thickness::Number(dermis_mm),
+        }
+    }
+}
 
 table!(Bone {
     tip_mm: bone_tip_mm: f64,
@@ -95,6 +159,8 @@ impl FingerFile {
 
     pub(super) fn into_finger(self, offset: Option<Arc<SkinOffset>>) -> Finger {
         let Self { shape: s, layers, bone, nail, tissue, source } = self;
+        let (epidermis_mm, epidermis_map) = layers.epidermis_mm.parts();
+        let (dermis_mm, dermis_map) = layers.dermis_mm.parts();
         let shape = FingertipShape {
             length_mm: s.length_mm,
             width_mm: s.width_mm,
@@ -102,8 +168,8 @@ impl FingerFile {
             cap_length_mm: s.cap_length_mm,
             cap_exponent: s.cap_exponent,
             crease_depth_mm: s.crease_depth_mm,
-            epidermis_mm: layers.epidermis_mm,
-            dermis_mm: layers.dermis_mm,
+            epidermis_mm,
+            dermis_mm,
             bone_tip_mm: bone.tip_mm,
             bone_cap_mm: bone.cap_mm,
             bone_offset_mm: bone.offset_mm,
@@ -116,6 +182,8 @@ impl FingerFile {
             nail_thickness_mm: nail.thickness_mm,
             bone_cortex_mm: bone.cortex_mm,
             offset,
+            epidermis_map,
+            dermis_map,
         };
         Finger { shape, tissue, source }
     }

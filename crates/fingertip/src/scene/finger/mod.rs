@@ -9,10 +9,11 @@ mod file;
 
 pub use error::FingerError;
 pub use fields::{FIELDS, Field};
-pub use file::Source;
+pub use file::{Source, Thickness};
 
 use super::materials::TissueTable;
 use super::origin::Origin;
+use crate::geometry::fingertip::offset::COLUMNS;
 use crate::geometry::fingertip::{FingertipShape, SkinOffset};
 use file::FingerFile;
 use papilla_dataset::sha256_hex;
@@ -112,10 +113,15 @@ impl Finger {
         for field in &FIELDS {
             let [low, high] = field.range;
             let values = field.values(&self.shape);
-            if let Some(&value) = values.iter().find(|v| !(low <= **v && **v <= high)) {
+            if let Some(k) = values.iter().position(|v| !(low <= *v && *v <= high)) {
+                let value = values[k];
                 let in_mm = 1e3 * value;
+                let place = match field.map(&self.shape) {
+                    Some(_) => format!("[{}][{}]", k / COLUMNS, k % COLUMNS),
+                    None => String::new(),
+                };
                 return Err(FingerError::Range {
-                    field: field.dotted(),
+                    field: field.dotted() + &place,
                     value,
                     range: field.range_words(),
                     metres: field.unit == "mm" && low <= in_mm && in_mm <= high,
@@ -147,7 +153,14 @@ pub(crate) fn sha256_of(shape: &FingertipShape, tissue: &TissueTable) -> String 
     struct Content<'a>(&'a FingertipShape, Option<&'a SkinOffset>, &'a TissueTable);
     let content = Content(shape, shape.offset.as_deref(), tissue);
     // Tables of finite numbers are always written.
-    sha256_hex(&serde_json::to_vec(&content).unwrap_or_default())
+    let mut text = serde_json::to_vec(&content).unwrap_or_default();
+    // Fingers without a map keep the hash that they had before there were maps.
+    for (name, map) in [("epidermis", &shape.epidermis_map), ("dermis", &shape.dermis_map)] {
+        if let Some(map) = map {
+            text.extend(serde_json::to_vec(&(name, map.rows_mm())).unwrap_or_default());
+        }
+    }
+    sha256_hex(&text)
 }
 
 fn read_offset(path: &Path) -> Result<SkinOffset, FingerError> {

@@ -89,6 +89,29 @@ fn layers_thicker_than_the_pulp_are_named_with_their_place() {
     assert_refused(e, 3, &["4.50 mm thick", "above the bone at x = 11.25", "they may take"]);
 }
 
+/// A file with a map of the dermis.
+fn mapped(mm: impl Fn(usize, usize) -> f64) -> String {
+    let row = |i| (0..COLUMNS).map(|j| mm(i, j)).collect::<Vec<f64>>();
+    let rows: String = (0..ROWS).map(|i| format!("  {:?},\n", row(i))).collect();
+    format!("[layers]\ndermis_mm = [\n{rows}]\n")
+}
+
+#[test]
+fn a_layer_may_be_a_map() {
+    let finger = parse(&mapped(|i, j| 0.9 + 0.01 * i as f64 + 0.001 * j as f64)).unwrap();
+    assert_eq!(parse(&finger.to_toml()).unwrap(), finger);
+    assert_ne!(finger.sha256(), Finger::usual().sha256());
+    // In the middle of the pad: row 8, column 0, smoothed with its neighbours round the finger.
+    assert!((finger.shape.dermis_mm - 0.984).abs() < 2e-3, "{}", finger.shape.dermis_mm);
+    let other = parse(&mapped(|i, j| 0.9 + 0.01 * i as f64 + 0.002 * j as f64)).unwrap();
+    assert_ne!(finger.sha256(), other.sha256());
+    let thick = mapped(|i, j| if (i, j) == (8, 5) { 3.5 } else { 1.0 });
+    assert_refused(&thick, 2, &["layers.dermis_mm[8][5] = 3.5", "0.2 to 3 mm"]);
+    assert_refused("[layers]\ndermis_mm = [[1.0]]\n", 2, &["layers.dermis_mm", "17 rows", "has 1"]);
+    assert_refused("[layers]\ndermis_mm = \"thin\"\n", 2, &["layers.dermis_mm", "or a map"]);
+    assert_refused(&mapped(|_, _| 2.9), 2, &["3.10 mm thick", "they may take"]);
+}
+
 #[test]
 fn a_skin_is_read_from_beside_the_file() {
     let folder = tempfile::tempdir().unwrap();
