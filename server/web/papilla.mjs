@@ -317,7 +317,7 @@ class Page {
     const { ready } = this.comparison.session ?? {};
     this.pictures.sure.other.show(answer.noContact ? null : answer.errorEstimate, NaN, this.#whyUnknown(ready?.tier));
     putParts('other-ms', this.comparison.times.words);
-    this.pictures.showPair(first, second, this.comparison.with, answer, ready?.pressure_max_pa);
+    this.pictures.showPair(first, second, this.comparison.with, answer, ready?.pressure_max_pa, this.solves && this.contact.friction > 0);
   }
 
   /** Why the service states no error for an answer of this tier, if it states none. */

@@ -17,6 +17,9 @@ export function equal(a, b) {
   return true;
 }
 
+const APART = 'The root of the summed squares of the difference, over that of the second map.';
+/** What rubs depends on the frames before: the second way may have got fewer of them. */
+const APART_RUBBED = 'With friction an answer depends on the frames before it, and the two got different ones.';
 const apartWords = (apart) => (Number.isNaN(apart) ? 'no SED' : `${(100 * apart).toFixed(1)} % apart`);
 
 export class Pictures {
@@ -69,7 +72,8 @@ export class Pictures {
   }
 
   /** Shows two answers to one contact, `second` in the way `of`, unless they are shown already. */
-  showPair(first, second, of, answer, mostPa) {
+  showPair(first, second, of, answer, mostPa, rubs) {
+    put('apart-about', rubs ? APART_RUBBED : APART);
     const { pair } = this;
     if (pair.of === of && equal(first, pair.first) && equal(second, pair.second)) return;
     const { pixels } = this.atlas.interface.raster;
