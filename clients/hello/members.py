@@ -142,6 +142,36 @@ SHAPES = (
         "Shape",
     ),
     Structure(
+        "BoxShape",
+        "A box with rounded edges. Its origin is its middle.",
+        (
+            Member("size_mm", "triple", (10.0, 10.0, 10.0), "Side lengths along x, y and z, mm."),
+            Member("edge_radius_mm", "number", 1.0, "Radius of its edges, mm: above 0, at most half the shortest side."),
+        ),
+        "box",
+        "Shape",
+    ),
+    Structure(
+        "CapsuleShape",
+        "A bar that lies along its y and ends in half balls. Its origin is its middle.",
+        (
+            Member("radius_mm", "number", 3.0, "Radius, mm."),
+            Member("length_mm", "number", 20.0, "Length with both half balls, mm: at least twice the radius."),
+        ),
+        "capsule",
+        "Shape",
+    ),
+    Structure(
+        "TorusShape",
+        "A ring of round section that lies flat, its hole along its z. Its origin is its middle.",
+        (
+            Member("radius_mm", "number", 4.0, "Radius of the circle in the middle of the tube, mm."),
+            Member("tube_radius_mm", "number", 1.0, "Radius of the tube, mm: below that of the circle."),
+        ),
+        "torus",
+        "Shape",
+    ),
+    Structure(
         "GratingShape",
         "Ridges along y on a base. Its origin lies in the plane of their tops, in the middle.",
         (
@@ -181,7 +211,7 @@ SHAPES = (
     ),
     Structure(
         "MeshShape",
-        "A closed mesh of at most 16 384 triangles. Its origin is that of its vertices.",
+        "A mesh of at most 16 384 triangles. Its origin is that of its vertices. The service mends one that is not closed, and says so.",
         (
             Member("vertices_mm", "vertices", (), "x, y, z of each vertex, mm."),
             Member("triangles", "triangles", (), "Three vertices for each triangle, counter-clockwise as seen from outside."),

@@ -4,6 +4,7 @@
 const PLATE_MM = { size: 20, edge: 0.5 };
 const BAR_MM = { length: 20, end: 0.5 };
 const WAVES = { columns: 64, side: 12, depth: 0.3 };
+const BOX_EDGE_MM = 0.5;
 const UNION = { size: 12, edge: 1, lift: 1 };
 /** Surface farther behind the face than this is not felt. */
 export const REACH_MM = 6;
@@ -128,6 +129,18 @@ export const SHAPES = {
       const d = Math.hypot(x, y);
       return Math.max(rounded(d - r + 0.25, 0.25), rounded(0.7 * r + 0.25 - d, 0.25));
     },
+  }) },
+  box: { label: 'Box', size: ['Side', 2, 12, 6], turns: true, make: (side) => ({
+    hello: { shape: 'box', size_mm: [side, side, side], edge_radius_mm: BOX_EDGE_MM }, faceMm: side / 2, halfMm: side / 2,
+    profile: (x, y) => plate(x, y, side, BOX_EDGE_MM),
+  }) },
+  capsule: { label: 'Capsule', size: ['Radius', 1, 6, 2.5], turns: true, make: (r) => ({
+    hello: { shape: 'capsule', radius_mm: r, length_mm: 4 * r }, faceMm: r, halfMm: 2 * r,
+    profile: (x, y) => ball(r, x * x + square(Math.max(0, Math.abs(y) - r))),
+  }) },
+  torus: { label: 'Torus', size: ['Radius', 2, 8, 4], turns: false, make: (r) => ({
+    hello: { shape: 'torus', radius_mm: r, tube_radius_mm: 0.25 * r }, faceMm: 0.25 * r, halfMm: 1.25 * r,
+    profile: (x, y) => ball(0.25 * r, square(Math.hypot(x, y) - r)),
   }) },
   grating: { label: 'Ridges', size: ['Width of ridge and groove', 0.5, 3, 1.5], turns: true, make: (w) => ({
     hello: { shape: 'grating', ridges: 5, ridge_mm: w, groove_mm: w, edge_radius_mm: Math.min(0.25, w / 4) }, faceMm: 0, halfMm: Math.max(10, 4.5 * w),

@@ -29,17 +29,18 @@ _SMALL_MM, _LARGE_MM = 0.5, 500.0
 _PAD_MM: Final = (11.25, 0.0, -6.53)
 _SAMPLES: Final = 4000
 _BLOCK: Final = 2_000_000
+_WINDING: Final = "inside will be told from outside by winding numbers, and the session's warnings say what was closed"
 
 
 class BadMesh(BadInput):
-    """A file holds no closed body that the service could press on a finger."""
+    """A file holds no surface that the service could press on a finger."""
 
 
 class Mesh(NamedTuple):
     """A body, and what was done to get it."""
 
     parts: list[tuple[NDArray[np.float64], NDArray[np.int64]]]
-    """Vertices, mm, and triangles of each closed body."""
+    """Vertices, mm, and triangles of each body."""
     notes: list[str]
     """What was mended, and what is to be known; empty if the file was as it should be."""
     decimated_mm: float
@@ -81,7 +82,9 @@ def load(path: str | PathLike[str], *, unit: str | None = None, triangles_max: i
     """Reads a mesh: merges vertices, turns triangles outward, parts bodies, decimates; says so in `notes`.
 
     `unit` is mm, cm, m or in. Without it GLB is in metres, as its standard says, and others count as mm; a size
-    that looks wrong is then asked about. Raises BadMesh for open and self-crossing surfaces, with the place.
+    that looks wrong is then asked about. A surface that is open or crosses itself is sent as it is, with a note:
+    whoever computes contact tells its inside from its outside by winding numbers, and says in the session's
+    `warnings` what it closed; a sheet, which has no inside, is refused there.
     """
     trimesh = _trimesh()
     file = Path(path)
@@ -117,12 +120,14 @@ def of(vertices_mm: Any, triangles: Any, *, triangles_max: int = TRIANGLES_MAX, 
     mesh.remove_unreferenced_vertices()
     if len(mesh.faces) < before:
         notes.append(f"{before - len(mesh.faces)} triangles without area, or twice there, were left out")
-    _closed(mesh, name)
-    bodies = list(mesh.split(only_watertight=False))
+    broken = _broken(mesh)
+    if broken:
+        notes.append(f"{broken}; {_WINDING}")
+    bodies = [mesh] if broken else list(mesh.split(only_watertight=False))
     if len(bodies) > _PARTS_MAX:
         raise BadMesh("path", f"{name} has {len(bodies)} bodies; a union takes {_PARTS_MAX}. Leave small ones out")
     turned = 0
-    for body in bodies:
+    for body in [] if broken else bodies:
         if not body.is_winding_consistent:
             trimesh.repair.fix_winding(body)
             turned += 1
@@ -138,12 +143,14 @@ def of(vertices_mm: Any, triangles: Any, *, triangles_max: int = TRIANGLES_MAX, 
     parts = []
     for body in bodies:
         if len(body.faces) > most:
-            fewer = _decimated(body, most, name)
+            fewer = _decimated(body, most, name, not broken)
             distance_mm = _distance_mm(body, fewer)
             decimated_mm = max(decimated_mm, distance_mm)
             notes.append(f"{len(body.faces)} triangles became {len(fewer.faces)}: at most {distance_mm:.3g} mm off")
             body = fewer
-        _uncrossed(body, name)
+        crossed = None if broken else _crossed(body)
+        if crossed:
+            notes.append(f"{crossed}; {_WINDING}")
         parts.append((np.asarray(body.vertices, np.float64), np.asarray(body.faces, np.int64)))
     return Mesh(parts, notes, decimated_mm)
 
@@ -174,29 +181,29 @@ def _factor(file: Path, unit: str | None, vertices: NDArray[np.float64]) -> floa
     return UNITS[own]
 
 
-def _closed(mesh: Any, name: str) -> None:
-    """Each edge has two triangles."""
+def _broken(mesh: Any) -> str | None:
+    """Words for edges that have not two triangles each."""
     edges, counts = np.unique(np.asarray(mesh.edges_sorted), axis=0, return_counts=True)
-    for wrong, words, cure in (
-        (
-            counts == 1,
-            "the surface is open",
-            "close its holes, in Blender by 'Fill Holes' or in MeshLab by 'Close Holes'",
-        ),
-        (counts > 2, "more than two triangles share an edge", "join its bodies by a boolean union, or part them"),
+    for wrong, words in (
+        (counts == 1, "the surface is open"),
+        (counts > 2, "more than two triangles share an edge"),
     ):
         if wrong.any():
             at = np.asarray(mesh.vertices)[edges[int(np.argmax(wrong))]].mean(axis=0)
-            place = ", ".join(f"{value:.3g}" for value in at)
-            raise BadMesh("path", f"{name}: {words}, at {int(wrong.sum())} edges, the first near ({place}) mm; {cure}")
+            return f"{words}, at {int(wrong.sum())} edges, the first near {_place(at)}"
+    return None
 
 
-def _decimated(body: Any, most: int, name: str) -> Any:
+def _place(at: NDArray[np.float64]) -> str:
+    return f"({', '.join(f'{value:.3g}' for value in at)}) mm"
+
+
+def _decimated(body: Any, most: int, name: str, closed: bool) -> Any:
     try:
         fewer = body.simplify_quadric_decimation(face_count=most)
     except ImportError as error:
         raise MissingExtra(f"a mesh of {len(body.faces)} triangles", "meshes") from error
-    if not fewer.is_watertight:
+    if closed and not fewer.is_watertight:
         raise BadMesh(
             "path", f"{name}: decimation to {most} triangles opens the surface; decimate it by a mesh program"
         )
@@ -214,8 +221,8 @@ def _distance_mm(one: Any, other: Any) -> float:
     return greatest
 
 
-def _uncrossed(body: Any, name: str) -> None:
-    """Raises BadMesh if two triangles that share no vertex cross."""
+def _crossed(body: Any) -> str | None:
+    """Words for two triangles that share no vertex and cross."""
     vertices, faces = np.asarray(body.vertices, np.float64), np.asarray(body.faces, np.int64)
     corners = vertices[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -238,12 +245,9 @@ def _uncrossed(body: Any, name: str) -> None:
         crossed = _pierced(corners[own], corners[other]) | _pierced(corners[other], corners[own])
         if crossed.any():
             at = corners[own[int(np.argmax(crossed))]].mean(axis=0)
-            place = ", ".join(f"{value:.3g}" for value in at)
-            raise BadMesh(
-                "path",
-                f"{name}: the surface crosses itself, first near ({place}) mm; join what overlaps by a boolean union",
-            )
+            return f"the surface crosses itself, first near {_place(at)}"
         start = stop
+    return None
 
 
 def _pierced(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.bool_]:

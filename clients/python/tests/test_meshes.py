@@ -48,22 +48,74 @@ def test_a_size_that_looks_wrong_is_asked_about(tmp_path):
         meshes.load(tmp_path / "large.glb", unit="feet")
 
 
-def test_open_and_crossing_surfaces_are_named_with_the_place():
+def test_open_and_crossing_surfaces_are_bodies_all_the_same(url):
     whole = ball()
-    with pytest.raises(meshes.BadMesh, match=r"open, at 3 edges, the first near \(.*Close Holes"):
-        meshes.of(whole.vertices, whole.faces[1:])
+    closed = meshes.of(whole.vertices, whole.faces)
+    pose = closed.under_pad(0.5)
+    due = force_n(url, [closed.object()], pose)
+    # Away from the hole, which is on the far side, it is the whole ball.
+    below = np.argsort(whole.triangles_center[:, 2])[20:]
+    bowl = meshes.of(whole.vertices, whole.faces[below])
+    assert any("open, at" in note and "first near (" in note and "winding" in note for note in bowl.notes)
+    assert force_n(url, [bowl.object()], pose) == pytest.approx(due, rel=1e-3)
+    with papilla.Session(url, input="objects", objects=[bowl.object()], map=False) as session:
+        assert any("1 hole was closed" in words for words in session.warnings), session.warnings
     pulled = whole.vertices.copy()
     pulled[int(np.argmax(pulled[:, 0])), 0] = -9.0
-    with pytest.raises(meshes.BadMesh, match="crosses itself"):
-        meshes.of(pulled, whole.faces)
+    crossing = meshes.of(pulled, whole.faces)
+    assert any("crosses itself" in note for note in crossing.notes)
+    assert force_n(url, [crossing.object()], pose) == pytest.approx(due, rel=0.02)
+
+
+def test_a_sheet_is_refused_where_contact_is_computed(url):
+    flat = [[x, y, 0.0] for x in range(4) for y in range(4)]
+    cells = [4 * x + y for x in range(3) for y in range(3)]
+    sheet = meshes.of(flat, [[a, a + 4, a + 5] for a in cells] + [[a, a + 5, a + 1] for a in cells])
+    with pytest.raises(papilla.Refused, match="no inside"):
+        force_n(url, [sheet.object()], sheet.under_pad(0.3))
     with pytest.raises(meshes.BadMesh, match="not finite"):
         meshes.of(np.full((4, 3), np.nan), [[0, 1, 2]])
+
+
+@pytest.mark.parametrize(
+    ("shape", "top_mm"),
+    [
+        ({"shape": "box", "size_mm": [8, 6, 4], "edge_radius_mm": 0.5}, 2.0),
+        ({"shape": "capsule", "radius_mm": 2, "length_mm": 9}, 2.0),
+        ({"shape": "torus", "radius_mm": 4, "tube_radius_mm": 1.5}, 1.5),
+    ],
+)
+def test_shapes_that_were_missed_press_as_their_meshes(url, shape, top_mm):
+    make = trimesh.creation
+    mesh = {
+        "box": lambda: _rounded_box([8, 6, 4], 0.5),
+        "capsule": lambda: make.capsule(height=5, radius=2, count=[48, 48]),
+        "torus": lambda: make.torus(4, 1.5, major_sections=72, minor_sections=48),
+    }[shape["shape"]]()
+    if shape["shape"] == "capsule":
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))
+        mesh.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    part = meshes.of(mesh.vertices, mesh.faces)
+    # Over the tube of a torus, not over its hole.
+    aside = shape["radius_mm"] if shape["shape"] == "torus" else 0.0
+    pose = [11.25 - aside, 0, -6.53 - top_mm + 0.5, 0, 0, 0, 1]
+    due = force_n(url, [part.object()], pose)
+    assert due > 0.01
+    assert force_n(url, [{"shape": shape}], pose) == pytest.approx(due, rel=0.03)
+
+
+def _rounded_box(size, radius):
+    """The convex hull of balls at its corners."""
+    corners = [[sx * (size[0] / 2 - radius), sy * (size[1] / 2 - radius), sz * (size[2] / 2 - radius)]
+               for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]  # fmt: skip
+    points = trimesh.creation.icosphere(subdivisions=3, radius=radius).vertices
+    return trimesh.convex.convex_hull(np.concatenate([points + corner for corner in corners]))
 
 
 def test_what_is_mended_is_said(url):
     whole = ball()
     inside_out = meshes.of(whole.vertices, whole.faces[:, ::-1])
-    assert any("turned" in note for note in inside_out.notes)
+    assert any("turned" in note for note in inside_out.notes) and not any("winding" in n for n in inside_out.notes)
     twice = np.concatenate([whole.faces, whole.faces[:2]])
     assert any("2 triangles" in note for note in meshes.of(whole.vertices, twice).notes)
     pose = inside_out.under_pad(0.4)

@@ -323,6 +323,57 @@ namespace Papilla
         }
     }
 
+    /// <summary>A box with rounded edges. Its origin is its middle.</summary>
+    public sealed class BoxShape : Shape
+    {
+        /// <summary>Side lengths along x, y and z, mm.</summary>
+        public double[] SizeMm = { 10, 10, 10 };
+        /// <summary>Radius of its edges, mm: above 0, at most half the shortest side.</summary>
+        public double EdgeRadiusMm = 1;
+
+        internal override JObject ToJson()
+        {
+            var json = new JObject { ["shape"] = "box" };
+            json["size_mm"] = Words.Of(SizeMm);
+            json["edge_radius_mm"] = EdgeRadiusMm;
+            return json;
+        }
+    }
+
+    /// <summary>A bar that lies along its y and ends in half balls. Its origin is its middle.</summary>
+    public sealed class CapsuleShape : Shape
+    {
+        /// <summary>Radius, mm.</summary>
+        public double RadiusMm = 3;
+        /// <summary>Length with both half balls, mm: at least twice the radius.</summary>
+        public double LengthMm = 20;
+
+        internal override JObject ToJson()
+        {
+            var json = new JObject { ["shape"] = "capsule" };
+            json["radius_mm"] = RadiusMm;
+            json["length_mm"] = LengthMm;
+            return json;
+        }
+    }
+
+    /// <summary>A ring of round section that lies flat, its hole along its z. Its origin is its middle.</summary>
+    public sealed class TorusShape : Shape
+    {
+        /// <summary>Radius of the circle in the middle of the tube, mm.</summary>
+        public double RadiusMm = 4;
+        /// <summary>Radius of the tube, mm: below that of the circle.</summary>
+        public double TubeRadiusMm = 1;
+
+        internal override JObject ToJson()
+        {
+            var json = new JObject { ["shape"] = "torus" };
+            json["radius_mm"] = RadiusMm;
+            json["tube_radius_mm"] = TubeRadiusMm;
+            return json;
+        }
+    }
+
     /// <summary>Ridges along y on a base. Its origin lies in the plane of their tops, in the middle.</summary>
     public sealed class GratingShape : Shape
     {
@@ -398,7 +449,7 @@ namespace Papilla
         }
     }
 
-    /// <summary>A closed mesh of at most 16 384 triangles. Its origin is that of its vertices.</summary>
+    /// <summary>A mesh of at most 16 384 triangles. Its origin is that of its vertices. The service mends one that is not closed, and says so.</summary>
     public sealed class MeshShape : Shape
     {
         /// <summary>x, y, z of each vertex, mm.</summary>

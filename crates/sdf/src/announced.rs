@@ -2,8 +2,8 @@
 
 use super::rules::{BadValue, ShapeError, length, parts, placed, require};
 use super::{
-    AnyOf, Cylinder, Dots, Grating, HeightField, IndenterSpec, Mesh, MeshError, Placed, Placement,
-    Plate, Punch, Ring, SignedDistance, Sphere, Wedge,
+    AnyOf, Capsule, Cuboid, Cylinder, Dots, Grating, HeightField, IndenterSpec, Mesh, MeshError,
+    Placed, Placement, Plate, Punch, Ring, SignedDistance, Sphere, Torus, Wedge,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -25,13 +25,20 @@ pub enum AnnouncedShape {
     Punch(Punch),
     /// Upright tube.
     Ring(Ring),
+    /// Box with rounded edges.
+    #[serde(rename = "box")]
+    Cuboid(Cuboid),
+    /// Lying bar that ends in half balls.
+    Capsule(Capsule),
+    /// Ring of round section, lying flat.
+    Torus(Torus),
     /// Parallel ridges.
     Grating(Grating),
     /// Braille-like dots.
     Dots(Dots),
     /// Surface of listed heights.
     Heightmap(HeightGrid),
-    /// Closed triangle mesh.
+    /// Triangle mesh.
     Mesh(Mesh),
     /// Several of them, each moved and turned.
     Union(AnnouncedUnion),
@@ -132,6 +139,9 @@ impl AnnouncedShape {
             Self::Wedge(s) => IndenterSpec::Wedge(*s),
             Self::Punch(s) => IndenterSpec::Punch(*s),
             Self::Ring(s) => IndenterSpec::Ring(*s),
+            Self::Cuboid(s) => IndenterSpec::Cuboid(*s),
+            Self::Capsule(s) => IndenterSpec::Capsule(*s),
+            Self::Torus(s) => IndenterSpec::Torus(*s),
             Self::Grating(s) => IndenterSpec::Grating(*s),
             Self::Dots(s) => IndenterSpec::Dots(*s),
             Self::Heightmap(s) => return Ok(Arc::new(s.build().map_err(|e| e.under(field))?)),
@@ -153,10 +163,9 @@ impl AnnouncedShape {
             return grid.tiny();
         }
         let member = match self {
-            Self::Sphere(_) => "radius_mm",
-            Self::Plate(_) => "size_mm",
-            Self::Cylinder(_) | Self::Wedge(_) | Self::Grating(_) => "length_mm",
-            Self::Punch(_) => "radius_mm",
+            Self::Sphere(_) | Self::Punch(_) | Self::Torus(_) => "radius_mm",
+            Self::Plate(_) | Self::Cuboid(_) => "size_mm",
+            Self::Cylinder(_) | Self::Capsule(_) | Self::Wedge(_) | Self::Grating(_) => "length_mm",
             Self::Ring(_) => "outer_radius_mm",
             Self::Dots(_) => "plate_mm",
             Self::Heightmap(_) | Self::Union(_) => "parts",
@@ -252,7 +261,10 @@ mod tests {
 
     #[test]
     fn what_a_scene_names_is_what_it_is_there() {
-        let names = ["plate", "sphere", "cylinder", "wedge", "punch", "ring", "grating", "dots"];
+        let names = [
+            "plate", "sphere", "cylinder", "wedge", "punch", "ring", "box", "capsule", "torus",
+            "grating", "dots",
+        ];
         for name in names {
             let text = format!("shape = \"{name}\"");
             let found = built(&text).expect("a shape");

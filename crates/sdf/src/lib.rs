@@ -19,6 +19,8 @@
 
 mod announced;
 mod beneath;
+mod capsule;
+mod cuboid;
 mod cylinder;
 mod dots;
 #[cfg(feature = "files")]
@@ -37,6 +39,7 @@ mod spec;
 mod sphere;
 #[cfg(test)]
 mod testing;
+mod torus;
 mod touch;
 mod union;
 pub mod vector;
@@ -44,11 +47,13 @@ mod wedge;
 
 pub use announced::{AnnouncedError, AnnouncedPart, AnnouncedShape, AnnouncedUnion, HeightGrid};
 pub use beneath::{Body, beneath, may_be_covered};
+pub use capsule::Capsule;
+pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use dots::Dots;
 pub use grating::Grating;
 pub use heightmap::{HeightField, Heightmap};
-pub use mesh::{Mesh, MeshDistance, MeshError, TRIANGLES_MAX};
+pub use mesh::{Mended, Mesh, MeshDistance, MeshError, TRIANGLES_MAX};
 pub use mesh_file::{LengthUnit, MeshFile};
 pub use placed::{Placed, Placement};
 pub use plate::{Plate, RoundedPlate};
@@ -57,6 +62,7 @@ pub use ring::Ring;
 pub use rules::{BadValue, ShapeError};
 pub use spec::{IndenterSpec, Part, Union};
 pub use sphere::Sphere;
+pub use torus::Torus;
 pub use touch::{TouchError, first_touch_travel};
 pub use union::{AnyOf, Ball};
 pub use wedge::Wedge;
@@ -103,6 +109,12 @@ pub trait SignedDistance: Send + Sync {
     /// the body alone and not on the machine.
     fn cost(&self) -> f64 {
         1.0
+    }
+
+    /// What was done to meshes in it to make bodies of them, for people; empty of a body that is as
+    /// it was told.
+    fn mended(&self) -> Vec<String> {
+        Vec::new()
     }
 
     /// Tells the faces through which a point leaves the body, in any order: of each the gap of its

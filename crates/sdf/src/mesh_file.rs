@@ -37,7 +37,7 @@ impl LengthUnit {
     }
 }
 
-/// A closed body whose surface is in a file.
+/// A body whose surface is in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -147,6 +147,18 @@ mod tests {
     }
 
     #[test]
+    fn a_file_of_an_open_surface_is_the_body_that_it_goes_round() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = obj(1.0).replace("f 5 6 8 7\n", "");
+        std::fs::write(folder.path().join("open.obj"), open).unwrap();
+        let spec: IndenterSpec = toml::from_str("shape = \"mesh\"\nfile = \"open.obj\"").unwrap();
+        let shape = spec.build(folder.path()).unwrap();
+        assert!((shape.distance([0.0, 0.0, 3.0]).gap_mm - 2.0).abs() < 1e-12);
+        let said = shape.mended();
+        assert!(said.len() == 1 && said[0].contains("1 hole was closed"), "{said:?}");
+    }
+
+    #[test]
     fn a_file_that_is_no_body_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let refused = |file: &str, text: &str| {
@@ -156,11 +168,15 @@ mod tests {
             let loaded = spec.load(folder.path());
             loaded.and_then(|()| spec.build(folder.path()).map(drop)).unwrap_err().to_string()
         };
-        let open = obj(1.0).replace("f 5 6 8 7\n", "");
+        // Two sides that face each other go round nothing.
+        let sides = ["f 1 5 7 3", "f 2 4 8 6"];
+        let whole = obj(1.0);
+        let kept = whole.lines().filter(|line| line.starts_with('v') || sides.contains(line));
+        let open = kept.collect::<Vec<_>>().join("\n");
         for (file, text, word) in [
             ("a.step", "", ".stl, .obj, .ply or .glb"),
             ("b.obj", "v 0 0 0\n", "no triangles"),
-            ("c.obj", open.as_str(), "Close it"),
+            ("c.obj", open.as_str(), "no inside"),
         ] {
             let said = refused(file, text);
             assert!(said.contains(file) && said.contains(word), "{said}");

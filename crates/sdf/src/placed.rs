@@ -135,6 +135,10 @@ impl SignedDistance for Placed {
         self.part.cost()
     }
 
+    fn mended(&self) -> Vec<String> {
+        self.part.mended()
+    }
+
     fn narrowest_mm(&self) -> f64 {
         self.part.narrowest_mm()
     }

@@ -2,8 +2,8 @@
 
 use super::rules::{BadValue, ShapeError, parts, placed, require};
 use super::{
-    AnyOf, Cylinder, Dots, Grating, Heightmap, MeshFile, Placed, Placement, Plate, Punch, Ring,
-    RoundedPlate, SignedDistance, Sphere, Wedge,
+    AnyOf, Capsule, Cuboid, Cylinder, Dots, Grating, Heightmap, MeshFile, Placed, Placement, Plate,
+    Punch, Ring, RoundedPlate, SignedDistance, Sphere, Torus, Wedge,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -26,13 +26,20 @@ pub enum IndenterSpec {
     Punch(Punch),
     /// Upright tube.
     Ring(Ring),
+    /// Box with rounded edges.
+    #[serde(rename = "box")]
+    Cuboid(Cuboid),
+    /// Lying bar that ends in half balls.
+    Capsule(Capsule),
+    /// Ring of round section, lying flat.
+    Torus(Torus),
     /// Parallel ridges.
     Grating(Grating),
     /// Braille-like dots.
     Dots(Dots),
     /// Surface from a picture.
     Heightmap(Heightmap),
-    /// Closed body from a file of triangles.
+    /// Body from a file of triangles.
     Mesh(MeshFile),
     /// Several of them, each moved and turned.
     Union(Union),
@@ -56,6 +63,9 @@ impl IndenterSpec {
             Self::Wedge(_) => "wedge",
             Self::Punch(_) => "punch",
             Self::Ring(_) => "ring",
+            Self::Cuboid(_) => "box",
+            Self::Capsule(_) => "capsule",
+            Self::Torus(_) => "torus",
             Self::Grating(_) => "grating",
             Self::Dots(_) => "dots",
             Self::Heightmap(_) => "heightmap",
@@ -80,6 +90,9 @@ impl IndenterSpec {
             Self::Wedge(s) => s.validate(),
             Self::Punch(s) => s.validate(),
             Self::Ring(s) => s.validate(),
+            Self::Cuboid(s) => s.validate(),
+            Self::Capsule(s) => s.validate(),
+            Self::Torus(s) => s.validate(),
             Self::Grating(s) => s.validate(),
             Self::Dots(s) => s.validate(),
             Self::Heightmap(s) => s.validate(),
@@ -106,6 +119,10 @@ impl IndenterSpec {
             Self::Wedge(s) => s.reach_mm(direction),
             Self::Punch(s) => s.reach_mm(direction),
             Self::Ring(s) => s.reach_mm(direction),
+            Self::Cuboid(s) if upright => 0.5 * s.size_mm[2],
+            Self::Cuboid(s) => RoundedPlate::from(s).reach_mm(direction),
+            Self::Capsule(s) => Cylinder::from(s).reach_mm(direction),
+            Self::Torus(s) => s.reach_mm(direction),
             Self::Grating(s) => s.reach_mm(direction),
             Self::Dots(s) => s.reach_mm(direction),
             Self::Heightmap(_) if upright => 0.0,
@@ -150,6 +167,9 @@ impl IndenterSpec {
             Self::Wedge(s) => shared(*s),
             Self::Punch(s) => shared(*s),
             Self::Ring(s) => shared(*s),
+            Self::Cuboid(s) => shared(RoundedPlate::from(s)),
+            Self::Capsule(s) => shared(Cylinder::from(s)),
+            Self::Torus(s) => shared(*s),
             Self::Grating(s) => shared(*s),
             Self::Dots(s) => shared(*s),
             Self::Heightmap(s) => shared(s.read(folder)?),
@@ -247,7 +267,10 @@ mod tests {
 
     #[test]
     fn a_shape_takes_its_defaults_and_comes_back() {
-        let names = ["plate", "sphere", "cylinder", "wedge", "punch", "ring", "grating", "dots"];
+        let names = [
+            "plate", "sphere", "cylinder", "wedge", "punch", "ring", "box", "capsule", "torus",
+            "grating", "dots",
+        ];
         for name in names {
             let spec = parse(&format!("shape = \"{name}\"")).unwrap();
             assert_eq!(spec.name(), name);

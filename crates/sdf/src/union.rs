@@ -138,6 +138,12 @@ impl SignedDistance for AnyOf {
         self.cost
     }
 
+    fn mended(&self) -> Vec<String> {
+        let each = self.parts.iter().enumerate();
+        each.flat_map(|(i, part)| part.mended().into_iter().map(move |m| format!("part {i}: {m}")))
+            .collect()
+    }
+
     fn narrowest_mm(&self) -> f64 {
         self.parts.iter().map(Placed::narrowest_mm).fold(f64::INFINITY, f64::min)
     }

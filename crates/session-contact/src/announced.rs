@@ -130,6 +130,11 @@ pub(crate) fn objects(
         if let Some((member, value)) = announced.shape.tiny(shape.as_ref()) {
             warnings.push(tiny(format!("{field}.{member}"), member, value));
         }
+        warnings.extend(shape.mended().into_iter().map(|done| Warning {
+            member: field.clone(),
+            value: None,
+            question: format!("{done}; is this the body that is meant?"),
+        }));
         let stiffness_mpa_per_mm = announced.stiffness_mpa_per_mm.unwrap_or(f64::INFINITY);
         if !(stiffness_mpa_per_mm > 0.0) {
             let message = format!("{stiffness_mpa_per_mm} MPa/mm; a stiffness is positive");

@@ -436,13 +436,14 @@ async fn what_cannot_be_is_named_and_nobody_else_notices() {
     let service = service().await;
     let (mut good, mut bad) = (service.socket().await, service.socket().await);
     good.open(ball_hello(&json!({"map": false}))).await;
-    let open_mesh = json!({"shape": "mesh", "vertices_mm": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        "triangles": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 1, 2]]});
+    let sheet = json!({"shape": "mesh",
+        "vertices_mm": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0], [1, 2, 0]],
+        "triangles": [[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]]});
     let crowd = json!({"shape": "mesh", "vertices_mm": [], "triangles": vec![[0, 0, 0]; 30_000]});
     let shape = |shape: Value| json!({"objects": [{"shape": shape}]});
     let refused = [
         (shape(json!({"shape": "sphere", "radius_mm": 0.0})), "bad_contact", "objects[0].shape"),
-        (shape(open_mesh), "bad_contact", "objects[0].shape"),
+        (shape(sheet), "bad_contact", "objects[0].shape"),
         (shape(crowd), "bad_contact", "objects[0].shape"),
         (json!({"fingers": []}), "bad_contact", "fingers"),
         (json!({"version": 2}), "unknown_version", "version"),
@@ -471,6 +472,37 @@ async fn what_cannot_be_is_named_and_nobody_else_notices() {
     }
     bad.send(rows(9, 0, &[deep(0.2)])).await;
     assert!(hear(&mut bad).await.1.force_n[2] > 0.0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_open_mesh_is_closed_and_the_client_is_told() {
+    let service = service().await;
+    let mut socket = service.socket().await;
+    let corner = |i: u32| [0, 1, 2].map(|k| if i >> k & 1 == 1 { 3.0 } else { -3.0 });
+    let vertices: Vec<[f64; 3]> = (0..8).map(corner).collect();
+    let sides =
+        [[4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5], [0, 2, 3, 1]];
+    let triangles = |sides: &[[u32; 4]]| -> Vec<[u32; 3]> {
+        sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
+    };
+    let mut forces = Vec::new();
+    for (sides, done) in [(&sides[..], 0), (&sides[..5], 1)] {
+        let shape =
+            json!({"shape": "mesh", "vertices_mm": vertices, "triangles": triangles(sides)});
+        let hello = ball_hello(&json!({"map": false, "objects": [{"shape": shape}]}));
+        let ready = socket.open(hello).await;
+        let warnings = ready["warnings"].as_array().cloned().unwrap_or_default();
+        assert_eq!(warnings.len(), done, "{warnings:?}");
+        for warning in warnings {
+            assert_eq!(warning["member"], "objects[0].shape");
+            let question = warning["question"].as_str().unwrap();
+            assert!(question.contains("1 hole was closed"), "{question}");
+        }
+        let pose = Pose { origin_mm: [0.0, 0.0, -2.8], ..Pose::default() };
+        socket.send(rows(1, 0, &[pose])).await;
+        forces.push(hear(&mut socket).await.1.force_n.map(f32::to_bits));
+    }
+    assert_eq!(forces[0], forces[1], "the hole is on the far side");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -152,6 +152,48 @@ struct RingShape {
   }
 };
 
+/// A box with rounded edges. Its origin is its middle.
+struct BoxShape {
+  /// Side lengths along x, y and z, mm.
+  std::array<double, 3> size_mm{10.0, 10.0, 10.0};
+  /// Radius of its edges, mm: above 0, at most half the shortest side.
+  double edge_radius_mm = 1.0;
+  static constexpr const char* name = "box";
+  template <class Self, class Out>
+  static void visit(Self& self, Out& out) {
+    out("size_mm", self.size_mm);
+    out("edge_radius_mm", self.edge_radius_mm);
+  }
+};
+
+/// A bar that lies along its y and ends in half balls. Its origin is its middle.
+struct CapsuleShape {
+  /// Radius, mm.
+  double radius_mm = 3.0;
+  /// Length with both half balls, mm: at least twice the radius.
+  double length_mm = 20.0;
+  static constexpr const char* name = "capsule";
+  template <class Self, class Out>
+  static void visit(Self& self, Out& out) {
+    out("radius_mm", self.radius_mm);
+    out("length_mm", self.length_mm);
+  }
+};
+
+/// A ring of round section that lies flat, its hole along its z. Its origin is its middle.
+struct TorusShape {
+  /// Radius of the circle in the middle of the tube, mm.
+  double radius_mm = 4.0;
+  /// Radius of the tube, mm: below that of the circle.
+  double tube_radius_mm = 1.0;
+  static constexpr const char* name = "torus";
+  template <class Self, class Out>
+  static void visit(Self& self, Out& out) {
+    out("radius_mm", self.radius_mm);
+    out("tube_radius_mm", self.tube_radius_mm);
+  }
+};
+
 /// Ridges along y on a base. Its origin lies in the plane of their tops, in the middle.
 struct GratingShape {
   /// Number of ridges: 1 to 1000.
@@ -218,7 +260,7 @@ struct HeightmapShape {
   }
 };
 
-/// A closed mesh of at most 16 384 triangles. Its origin is that of its vertices.
+/// A mesh of at most 16 384 triangles. Its origin is that of its vertices. The service mends one that is not closed, and says so.
 struct MeshShape {
   /// x, y, z of each vertex, mm.
   std::vector<std::array<double, 3>> vertices_mm;
@@ -252,7 +294,7 @@ struct UnionShape {
 };
 
 /// A shape of an object. Lengths are in mm, above 0 and at most 1000 unless a member says otherwise.
-using Shape = std::variant<std::monostate, PlateShape, SphereShape, CylinderShape, WedgeShape, PunchShape, RingShape, GratingShape, DotsShape, HeightmapShape, MeshShape, UnionShape, OtherShape>;
+using Shape = std::variant<std::monostate, PlateShape, SphereShape, CylinderShape, WedgeShape, PunchShape, RingShape, BoxShape, CapsuleShape, TorusShape, GratingShape, DotsShape, HeightmapShape, MeshShape, UnionShape, OtherShape>;
 
 /// A part of a union, moved and turned in the union's axes.
 struct UnionPart {

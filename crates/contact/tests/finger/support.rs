@@ -3,8 +3,8 @@
 use papilla_atlas::{Atlas, PatchVertices};
 use papilla_contact::{Arrays, ContactModel, Header, Layer, Object};
 use papilla_sdf::{
-    Cylinder, Dots, Grating, Mesh, Placement, Plate, Punch, Ring, RoundedPlate, SignedDistance,
-    Sphere, Wedge,
+    Capsule, Cuboid, Cylinder, Dots, Grating, Mesh, Placement, Plate, Punch, Ring, RoundedPlate,
+    SignedDistance, Sphere, Torus, Wedge,
 };
 use std::sync::Arc;
 
@@ -120,6 +120,9 @@ pub(crate) fn shapes() -> Vec<(Arc<dyn SignedDistance>, f64)> {
         (Arc::new(Grating::default()), 0.0),
         (Arc::new(Dots::default()), 0.0),
         (Arc::new(cuboid([3.0, 2.0, 1.0]).build().expect("closed")), 1.0),
+        (Arc::new(RoundedPlate::from(&Cuboid::default())), 5.0),
+        (Arc::new(Cylinder::from(&Capsule::default())), 3.0),
+        (Arc::new(Torus::default()), 1.0),
     ]
 }
 

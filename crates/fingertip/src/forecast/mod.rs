@@ -78,7 +78,7 @@ impl Forecast {
         // Elements first: after the matrix product's wide registers the same code was
         // measured to run three times slower for a while.
         let pass = Pass::probe(problem);
-        let (machine, work) = (Machine::probe(), Work::new(setup));
+        let (machine, work) = (Machine::here(), Work::new(setup));
         let fluid = problem.fluid.as_ref().map(|f| &f.system);
         // Forward and backward through the f32 factor, once through tangent and pattern; with fluid
         // twice through that of f64, one pass of refinement.

@@ -39,6 +39,9 @@ pub struct Explanation {
     file: PathBuf,
     geometry: String,
     indenter: String,
+    /// What was done to its meshes to make bodies of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    mended: Vec<String>,
     motion: String,
     /// Written by `solve` beside `summary.json`.
     outputs: Vec<Output>,
@@ -109,6 +112,7 @@ impl Explanation {
                 Some(pressure) => pressed(pressure),
                 None => table(&scene.indenter, "shape"),
             },
+            mended: setup.approach.shape.mended(),
             motion: motion(scene, &setup.drive),
             outputs: Output::ALL.into_iter().filter(|&o| scene.writes(o)).collect(),
             simulated: simulated.collect(),
@@ -126,10 +130,11 @@ impl Explanation {
     pub fn human(&self) -> String {
         let e = self;
         let mut text = format!(
-            "{}\n  geometry  {}\n  indenter  {}\n  motion    {}\n  writes    {}\n\nsimulated\n",
+            "{}\n  geometry  {}\n  indenter  {}{}\n  motion    {}\n  writes    {}\n\nsimulated\n",
             e.file.display(),
             e.geometry,
             e.indenter,
+            e.mended.iter().map(|done| format!("\n            {done}")).collect::<String>(),
             e.motion,
             std::iter::once("summary")
                 .chain(e.outputs.iter().map(|o| o.as_str()))

@@ -85,4 +85,33 @@ pub enum MeshError {
     /// Normals that point inward.
     #[error("the triangles are inside out; swap two corners of every one")]
     InsideOut,
+    /// An open surface that goes round nothing, as a sheet.
+    #[error(
+        "the surface has no inside: it goes round no place by more than {percent} %, as its winding \
+         number says. Close it, or give a sheet a thickness"
+    )]
+    NoInside {
+        /// How far it goes round a place at most.
+        percent: u32,
+    },
+}
+
+impl MeshError {
+    /// Whether the surface may mean a body all the same.
+    pub(super) const fn can_be_mended(&self) -> bool {
+        match self {
+            Self::Flat { .. }
+            | Self::Open { .. }
+            | Self::Crossing { .. }
+            | Self::Touching { .. }
+            | Self::Nested { .. }
+            | Self::InsideOut => true,
+            Self::Count { .. }
+            | Self::Vertex { .. }
+            | Self::Index { .. }
+            | Self::TooTangled { .. }
+            | Self::Stopped
+            | Self::NoInside { .. } => false,
+        }
+    }
 }

@@ -1,18 +1,22 @@
-//! Closed triangle meshes.
+//! Triangle meshes.
 //!
 //! The sign of the distance is that of the angle-weighted normal of the nearest face, edge or
 //! corner (Baerentzen & Aanaes, *Signed distance computation using the angle weighted
 //! pseudonormal*, 2005), which is right for closed meshes of any shape. Libraries that do the same
-//! take memory for each question; this takes none.
+//! take memory for each question; this takes none. A surface that is open or crosses itself is
+//! [mended](mend) first.
 
 mod check;
 mod closest;
 mod error;
+mod mend;
 mod shells;
 mod tree;
+mod winding;
 mod work;
 
 pub use error::MeshError;
+pub use mend::Mended;
 
 use super::beneath::SEAM_MM;
 use super::{Distance, SignedDistance};
@@ -21,6 +25,7 @@ use check::Checked;
 use closest::{Feature, closest};
 use serde::{Deserialize, Serialize};
 use tree::Tree;
+use winding::Winding;
 
 /// Most triangles of a mesh.
 pub const TRIANGLES_MAX: usize = 16_384;
@@ -33,6 +38,11 @@ const SAMPLES: usize = 128;
 const AWAY_MM: f64 = 0.5;
 /// Time of a triangle and its share of the boxes, in those of a sphere's distance.
 const PER_TRIANGLE: f64 = 2.5;
+/// Time of a box or triangle of a winding number, in those of a sphere's distance, times the share of
+/// places that are nearest to an edge: only these ask for it.
+const PER_WINDING: f64 = 0.6;
+/// Most of the places whose nearest triangle and winding number may differ about the side.
+const UNSURE: f64 = 0.1;
 
 /// A mesh as it is told: corners and the triangles between them, counter-clockwise seen from
 /// outside. Corners at the very same place are one.
@@ -46,12 +56,13 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// The signed distance of a closed mesh.
+/// The signed distance of a mesh.
 pub struct MeshDistance {
     tree: Tree,
     faces: Vec<Face>,
     corners_mm: Vec<[f64; 3]>,
     cost: f64,
+    mended: Option<(Winding, Mended)>,
 }
 
 /// A triangle, ready to be asked.
@@ -62,10 +73,11 @@ struct Face {
 }
 
 impl Mesh {
-    /// Its signed distance.
+    /// Its signed distance. One that is open, crosses itself or is turned the wrong way is mended
+    /// first, see [`MeshDistance::mended`].
     ///
     /// # Errors
-    /// [`MeshError`] names the triangle or edge for which the mesh bounds no body.
+    /// [`MeshError`] says why the mesh bounds no body.
     pub fn build(&self) -> Result<MeshDistance, MeshError> {
         self.build_until(&|| true)
     }
@@ -76,7 +88,11 @@ impl Mesh {
     /// # Errors
     /// As [`Self::build`]; [`MeshError::Stopped`] once `go_on` said no.
     pub fn build_until(&self, go_on: &dyn Fn() -> bool) -> Result<MeshDistance, MeshError> {
-        Ok(MeshDistance::new(check::checked(self, go_on)?))
+        match check::checked(self, go_on) {
+            Ok(closed) => Ok(MeshDistance::new(closed)),
+            Err(error) if error.can_be_mended() => MeshDistance::of(mend::body(self, go_on)?),
+            Err(error) => Err(error),
+        }
     }
 
     /// The distance of a surface that need not be closed, of any number of triangles: its sign is
@@ -115,21 +131,54 @@ impl MeshDistance {
             Face { corners_mm: place(*triangle), normals: normals.map(scaled_to_one) }
         });
         let faces = faces.collect();
-        let mut built = Self { faces, tree, corners_mm, cost: 1.0 };
+        let mut built = Self { faces, tree, corners_mm, cost: 1.0, mended: None };
         built.cost = 1.0 + PER_TRIANGLE * built.triangles_asked();
         built
     }
 
-    /// Mean number of triangles that are asked for a distance, at places on both sides of the
-    /// surface.
-    fn triangles_asked(&self) -> f64 {
+    /// That of a mended surface.
+    fn of(body: mend::Body) -> Result<Self, MeshError> {
+        let mend::Body { checked, winding, mended } = body;
+        let mut built = Self::new(checked);
+        let (mut looked, mut unsure, mut count) = (0, 0.0, 0.0);
+        for p in built.samples() {
+            let (_, _, side, feature) = built.nearest(p);
+            count += 1.0;
+            looked += winding.looked_at(p);
+            if matches!(feature, Feature::Face) && (side < 0.0) != winding.is_inside(p) {
+                unsure += 1.0;
+            }
+        }
+        if unsure > UNSURE * count {
+            let percent = (100.0 * (1.0 - unsure / count)) as u32;
+            return Err(MeshError::NoInside { percent });
+        }
+        built.cost += PER_WINDING * f64::from(looked) / count;
+        built.mended = Some((winding, mended));
+        Ok(built)
+    }
+
+    /// What was done to the mesh to make a body of it; nothing to a closed one.
+    #[must_use]
+    pub fn mended(&self) -> Option<Mended> {
+        self.mended.as_ref().map(|(_, mended)| *mended)
+    }
+
+    /// Some places on both sides of the surface.
+    fn samples(&self) -> impl Iterator<Item = [f64; 3]> + use<'_> {
         let step = self.faces.len().div_ceil(SAMPLES);
-        let (mut asked, mut places) = (0u32, 0u32);
-        for (i, face) in self.faces.iter().step_by(step).enumerate() {
+        self.faces.iter().step_by(step).enumerate().map(|(i, face)| {
             let [a, b, c] = face.corners_mm;
             let away = if i % 2 == 0 { AWAY_MM } else { -AWAY_MM };
             let n = face.normals[0];
-            let p = std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0 + away * n[k]);
+            std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0 + away * n[k])
+        })
+    }
+
+    /// Mean number of triangles that are asked for a distance.
+    fn triangles_asked(&self) -> f64 {
+        let (mut asked, mut places) = (0u32, 0u32);
+        for p in self.samples() {
             places += 1;
             self.tree.nearest(p, |face, _| {
                 asked += 1;
@@ -138,14 +187,10 @@ impl MeshDistance {
         }
         f64::from(asked) / f64::from(places)
     }
-}
 
-impl SignedDistance for MeshDistance {
-    fn cost(&self) -> f64 {
-        self.cost
-    }
-
-    fn distance(&self, p: [f64; 3]) -> Distance {
+    /// The nearest triangle, its nearest point, how far before it `p` lies by its pseudonormal, and
+    /// what of it is nearest.
+    fn nearest(&self, p: [f64; 3]) -> (usize, [f64; 3], f64, Feature) {
         let mut best = (f64::INFINITY, 0, [0.0; 3], Feature::Face);
         self.tree.nearest(p, |face, limit| {
             let (q, feature) = closest(p, &self.faces[face].corners_mm);
@@ -155,12 +200,32 @@ impl SignedDistance for MeshDistance {
             }
             square
         });
-        let (square, face, q, feature) = best;
+        let (_, face, q, feature) = best;
+        let outward = self.faces[face].normals[feature.index()];
+        (face, q, dot(minus(p, q), outward), feature)
+    }
+}
+
+impl SignedDistance for MeshDistance {
+    fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    fn mended(&self) -> Vec<String> {
+        self.mended.iter().map(|(_, mended)| mended.to_string()).collect()
+    }
+
+    fn distance(&self, p: [f64; 3]) -> Distance {
+        let (face, q, side, feature) = self.nearest(p);
         let face = &self.faces[face];
         let outward = face.normals[feature.index()];
         let away = minus(p, q);
-        let side = dot(away, outward);
-        let gap_mm = if side < 0.0 { -square.sqrt() } else { square.sqrt() };
+        let is_inside = match &self.mended {
+            // Pieces of triangles do not share edges: their pseudonormals say nothing.
+            Some((winding, _)) if !matches!(feature, Feature::Face) => winding.is_inside(p),
+            _ => side < 0.0,
+        };
+        let gap_mm = if is_inside { -square(away).sqrt() } else { square(away).sqrt() };
         if gap_mm.abs() < ON_SURFACE_MM {
             return Distance { gap_mm, normal: outward, hessian: [[0.0; 3]; 3] };
         }

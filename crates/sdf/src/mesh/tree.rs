@@ -66,6 +66,51 @@ impl Tree {
         self.split(triangles, half, last);
     }
 
+    /// A value for each box: of a leaf from its triangles, of others from their two halves.
+    pub(super) fn sums<T: Copy>(
+        &self,
+        leaf: impl Fn(&[u32], [[f64; 3]; 2]) -> T,
+        both: impl Fn(T, T, [[f64; 3]; 2]) -> T,
+    ) -> Vec<T> {
+        // Halves lie behind the whole: the last box first.
+        let mut sums: Vec<T> = Vec::with_capacity(self.nodes.len());
+        let last = self.nodes.len();
+        for (at, node) in self.nodes.iter().enumerate().rev() {
+            let ends = [node.low, node.high];
+            let of = |at: usize| sums[last - 1 - at];
+            sums.push(if node.second == 0 {
+                leaf(&self.order[node.leaf[0] as usize..node.leaf[1] as usize], ends)
+            } else {
+                both(of(at + 1), of(node.second as usize), ends)
+            });
+        }
+        sums.reverse();
+        sums
+    }
+
+    /// Goes from the whole to the parts: `into` says of a box whether to look into it, `each` is
+    /// called with every triangle of the leaves that were looked into.
+    pub(super) fn descend(&self, mut into: impl FnMut(usize) -> bool, mut each: impl FnMut(usize)) {
+        let mut stack = [0u32; DEPTH_MAX];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let at = stack[height];
+            if !into(at as usize) {
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            if node.second == 0 {
+                let own = &self.order[node.leaf[0] as usize..node.leaf[1] as usize];
+                own.iter().for_each(|t| each(*t as usize));
+                continue;
+            }
+            stack[height] = node.second;
+            stack[height + 1] = at + 1;
+            height += 2;
+        }
+    }
+
     /// Asks triangles for the squares of their distances from `p`, nearest boxes first, until no
     /// box is nearer than the least one; `ask` is told that too.
     pub(super) fn nearest(&self, p: [f64; 3], mut ask: impl FnMut(usize, f64) -> f64) {

@@ -61,6 +61,9 @@ struct Summary {
     /// what is no fingertip.
     #[serde(skip_serializing_if = "Option::is_none")]
     sed_error: Option<(SedError, &'static str)>,
+    /// What was done to meshes to make bodies of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    mended: Vec<String>,
     /// True if it was told to end before its last state.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     stopped: bool,
@@ -72,6 +75,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
     let clock = Instant::now();
     let mut setup = Simulation::new(&scene)?;
+    let mended = setup.approach.shape.mended();
+    for done in &mended {
+        eprintln!("{}: {done}", args.scene.display());
+    }
     let maps = FingerMaps::new(&mut setup.body)?;
     let mapped = scene.writes(Output::Maps) || scene.writes(Output::Pictures);
     let body = &setup.body;
@@ -98,6 +105,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         solve_s: clock.elapsed().as_secs_f64(),
         effort: pressed.iter().fold(Effort::default(), |sum, p| sum.plus(&p.report.effort)),
         sed_error: SedError::of(&scene.geometry),
+        mended,
         stopped: matches!(solved, Err(SimulationError::Halted)),
         increments: pressed.iter().map(|p| Increment::of(p, maps.as_ref())).collect(),
         scene,

@@ -227,6 +227,45 @@ class ShapeRing extends Typed:
 		return json
 
 
+# A box with rounded edges. Its origin is its middle.
+class ShapeBox extends Typed:
+	# Side lengths along x, y and z, mm.
+	var size_mm = [10.0, 10.0, 10.0]
+	# Radius of its edges, mm: above 0, at most half the shortest side.
+	var edge_radius_mm = 1.0
+	func words():
+		var json = {"shape": "box"}
+		json["size_mm"] = plain(size_mm)
+		json["edge_radius_mm"] = plain(edge_radius_mm)
+		return json
+
+
+# A bar that lies along its y and ends in half balls. Its origin is its middle.
+class ShapeCapsule extends Typed:
+	# Radius, mm.
+	var radius_mm = 3.0
+	# Length with both half balls, mm: at least twice the radius.
+	var length_mm = 20.0
+	func words():
+		var json = {"shape": "capsule"}
+		json["radius_mm"] = plain(radius_mm)
+		json["length_mm"] = plain(length_mm)
+		return json
+
+
+# A ring of round section that lies flat, its hole along its z. Its origin is its middle.
+class ShapeTorus extends Typed:
+	# Radius of the circle in the middle of the tube, mm.
+	var radius_mm = 4.0
+	# Radius of the tube, mm: below that of the circle.
+	var tube_radius_mm = 1.0
+	func words():
+		var json = {"shape": "torus"}
+		json["radius_mm"] = plain(radius_mm)
+		json["tube_radius_mm"] = plain(tube_radius_mm)
+		return json
+
+
 # Ridges along y on a base. Its origin lies in the plane of their tops, in the middle.
 class ShapeGrating extends Typed:
 	# Number of ridges: 1 to 1000.
@@ -290,7 +329,7 @@ class ShapeHeightmap extends Typed:
 		return json
 
 
-# A closed mesh of at most 16 384 triangles. Its origin is that of its vertices.
+# A mesh of at most 16 384 triangles. Its origin is that of its vertices. The service mends one that is not closed, and says so.
 class ShapeMesh extends Typed:
 	# x, y, z of each vertex, mm. Vector3s, or arrays of three.
 	var vertices_mm = []

@@ -147,6 +147,9 @@ enum class EPapillaShapeKind : uint8
     Wedge,
     Punch,
     Ring,
+    Box,
+    Capsule,
+    Torus,
     Grating,
     Dots,
     Heightmap,
@@ -236,6 +239,30 @@ struct FPapillaShape
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Ring", EditConditionHides))
     double RingHeightMm = 6.0;
 
+    /** A box with rounded edges. Its origin is its middle. Side lengths along x, y and z, mm. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Box", EditConditionHides))
+    FVector BoxSizeMm = FVector(10.0, 10.0, 10.0);
+
+    /** A box with rounded edges. Its origin is its middle. Radius of its edges, mm: above 0, at most half the shortest side. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Box", EditConditionHides))
+    double BoxEdgeRadiusMm = 1.0;
+
+    /** A bar that lies along its y and ends in half balls. Its origin is its middle. Radius, mm. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Capsule", EditConditionHides))
+    double CapsuleRadiusMm = 3.0;
+
+    /** A bar that lies along its y and ends in half balls. Its origin is its middle. Length with both half balls, mm: at least twice the radius. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Capsule", EditConditionHides))
+    double CapsuleLengthMm = 20.0;
+
+    /** A ring of round section that lies flat, its hole along its z. Its origin is its middle. Radius of the circle in the middle of the tube, mm. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Torus", EditConditionHides))
+    double TorusRadiusMm = 4.0;
+
+    /** A ring of round section that lies flat, its hole along its z. Its origin is its middle. Radius of the tube, mm: below that of the circle. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Torus", EditConditionHides))
+    double TorusTubeRadiusMm = 1.0;
+
     /** Ridges along y on a base. Its origin lies in the plane of their tops, in the middle. Number of ridges: 1 to 1000. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Grating", EditConditionHides))
     int32 GratingRidges = 5;
@@ -292,11 +319,11 @@ struct FPapillaShape
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Heightmap", EditConditionHides))
     TArray<double> HeightmapHeightsMm;
 
-    /** A closed mesh of at most 16 384 triangles. Its origin is that of its vertices. x, y, z of each vertex, mm. */
+    /** A mesh of at most 16 384 triangles. Its origin is that of its vertices. The service mends one that is not closed, and says so. x, y, z of each vertex, mm. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Mesh", EditConditionHides))
     TArray<FVector> MeshVerticesMm;
 
-    /** A closed mesh of at most 16 384 triangles. Its origin is that of its vertices. Three vertices for each triangle, counter-clockwise as seen from outside. */
+    /** A mesh of at most 16 384 triangles. Its origin is that of its vertices. The service mends one that is not closed, and says so. Three vertices for each triangle, counter-clockwise as seen from outside. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (EditCondition = "Kind == EPapillaShapeKind::Mesh", EditConditionHides))
     TArray<FIntVector> MeshTriangles;
 
@@ -358,6 +385,27 @@ struct FPapillaShape
             Out.inner_radius_mm = RingInnerRadiusMm;
             Out.rim_radius_mm = RingRimRadiusMm;
             Out.height_mm = RingHeightMm;
+            return Out;
+        }
+        case EPapillaShapeKind::Box:
+        {
+            papilla::BoxShape Out;
+            Out.size_mm = PapillaHello::Three(BoxSizeMm);
+            Out.edge_radius_mm = BoxEdgeRadiusMm;
+            return Out;
+        }
+        case EPapillaShapeKind::Capsule:
+        {
+            papilla::CapsuleShape Out;
+            Out.radius_mm = CapsuleRadiusMm;
+            Out.length_mm = CapsuleLengthMm;
+            return Out;
+        }
+        case EPapillaShapeKind::Torus:
+        {
+            papilla::TorusShape Out;
+            Out.radius_mm = TorusRadiusMm;
+            Out.tube_radius_mm = TorusTubeRadiusMm;
             return Out;
         }
         case EPapillaShapeKind::Grating:
