@@ -78,7 +78,7 @@ test('a press is solved by the server, and the page says so', async () => {
 
 test('every indenter pushes back along its normal, from where it stands', async () => {
   const shapes = await page.locator('input[name=shape]').evaluateAll((all) => all.map((input) => input.value));
-  assert.equal(shapes.length, 11, String(shapes));
+  assert.equal(shapes.length, 14, String(shapes));
   for (const shape of [...shapes, 'plate']) {
     await chooseRadio('shape', shape);
     await settled();
