@@ -10,7 +10,7 @@
 
 mod poses;
 
-use papilla_contact::{Contact, PixelContact, PixelSpacing, Settings, Solver};
+use papilla_contact::{Contact, PixelContact, PixelSpacing, Quality, Settings, Solver};
 use poses::{DEPTH_MM, Pad, shapes};
 use std::error::Error;
 use std::path::Path;
@@ -43,22 +43,26 @@ impl Asked {
     }
 }
 
-/// Poses that touch, and those that were flagged as unsettled.
+/// Poses that touch, those that were flagged as unsettled, and those of them whose rounds settled,
+/// but whose force fell while the object moved further in.
 #[derive(Clone, Copy, Default)]
 struct Count {
     touching: usize,
     unsettled: usize,
+    faded: usize,
 }
 
 impl Count {
-    fn note(&mut self, is_settled: bool) {
+    fn note(&mut self, quality: Quality) {
         self.touching += 1;
-        self.unsettled += usize::from(!is_settled);
+        self.unsettled += usize::from(!quality.settled);
+        self.faded += usize::from(quality.has_faded);
     }
 
     fn told(self, name: &str) -> String {
-        let share = 100.0 * self.unsettled as f64 / self.touching.max(1) as f64;
-        format!("| {name} | {} | {} | {share:.1} |", self.touching, self.unsettled)
+        let Self { touching, unsettled, faded } = self;
+        let share = 100.0 * unsettled as f64 / touching.max(1) as f64;
+        format!("| {name} | {touching} | {unsettled} | {share:.1} | {faded} |")
     }
 }
 
@@ -87,22 +91,21 @@ fn main() -> Result<(), Box<dyn Error>> {
         if !(pixels.peak_pa() > 0.0) {
             continue;
         }
-        let settled = out.quality.settled;
         units.push(1e-6 * out.effort.work as f64);
-        all.note(settled);
+        all.note(out.quality);
         if out.quality.is_held {
-            held.note(settled);
+            held.note(out.quality);
         }
         if objects.len() > 1 {
-            two.note(settled);
+            two.note(out.quality);
         } else if pad.clearance_mm(&objects[0]) > -DEPTH_MM {
-            by_shape[which].note(settled);
+            by_shape[which].note(out.quality);
         } else {
-            deep.note(settled);
+            deep.note(out.quality);
         }
     }
     println!("{poses} poses of seed {seed}, {spacing:?}\n");
-    println!("| poses | touch | unsettled | % |\n|---|---|---|---|");
+    println!("| poses | touch | unsettled | % | of these, the force fell |\n|---|---|---|---|---|");
     for ((name, ..), count) in shapes.iter().zip(&by_shape) {
         println!("{}", count.told(name));
     }

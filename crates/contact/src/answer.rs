@@ -40,8 +40,11 @@ pub struct Quality {
     /// Whether the deformation is beyond what the model was made for, or more vertices could
     /// touch than are looked at.
     pub out_of_range: bool,
-    /// Whether the iteration settled.
+    /// Whether the iteration settled, and the force of the only object did not fall while that moved
+    /// further in.
     pub settled: bool,
+    /// Whether it is such a fall alone for which the answer is not settled.
+    pub has_faded: bool,
     /// Whether a body lies so deep, or is so thin, that it is held on the side from which it came.
     pub is_held: bool,
 }

@@ -14,6 +14,8 @@ pub(crate) const SLOTS_MAX: usize = 512;
 /// Rows are an odd number of these long: of a length that is a power of two all would fall into
 /// the same few lines of a cache.
 const BLOCK: usize = 16;
+/// Units of work of a value that lies alone in a line of a cache, which is fetched for it.
+const LINE: usize = 16;
 
 /// Values of the slots, vectors component by component.
 #[derive(Clone, Debug)]
@@ -51,6 +53,8 @@ pub(crate) struct Patch {
     /// `[slot][component pair][slot]`.
     blocks: Vec<f32>,
     near: usize,
+    /// Units of work since [`Patch::take_work`].
+    work: u64,
     pub values: Slots,
 }
 
@@ -91,8 +95,19 @@ impl Patch {
             stride: row_length(0),
             blocks: vec![0.0; 9 * slots_max * row_length(slots_max)],
             near: 0,
+            work: 0,
             values: Slots::new(slots_max),
         }
+    }
+
+    /// Units of work of all that was done since this was asked last.
+    pub(crate) fn take_work(&mut self) -> u64 {
+        std::mem::take(&mut self.work)
+    }
+
+    /// Counts units of work.
+    pub(crate) fn count(&mut self, units: usize) {
+        self.work += units as u64;
     }
 
     /// Most vertices that it can hold, and the length of a row of them.
@@ -106,10 +121,12 @@ impl Patch {
         let (slots, n) = (slots.min(self.slots_max).max(self.ids.len()), self.ids.len());
         let (old, new) = (self.stride, row_length((slots + slots / 8).min(self.slots_max)));
         if slots > old {
+            self.count(9 * n * n);
             for row in (0..9 * n).rev() {
                 self.blocks.copy_within(row * old..row * old + n, row * new);
             }
         } else if 2 * new < old {
+            self.count(9 * n * n);
             for row in 0..9 * n {
                 self.blocks.copy_within(row * old..row * old + n, row * new);
             }
@@ -149,6 +166,8 @@ impl Patch {
             self.make_room(slot + 1);
         }
         let stride = self.stride;
+        // A row is filled, and a column, in which each value lies alone.
+        self.count(9 * (1 + LINE) * (slot + 1));
         self.ids.push(vertex);
         self.slot_of[vertex as usize] = slot as u16;
         for (k, &other) in self.ids.iter().enumerate() {
@@ -227,6 +246,7 @@ impl Patch {
             return;
         }
         let (n, stride) = (self.ids.len(), self.stride);
+        self.count(9 * (2 + 2 * LINE) * n);
         let (low, high) = (a.min(b), a.max(b));
         let (head, tail) = self.blocks.split_at_mut(9 * high * stride);
         for pair in 0..9 {
@@ -248,6 +268,7 @@ impl Patch {
     /// Displacement of the first `rows` slots by compliance alone under the forces of the near ones.
     pub(crate) fn displace(&mut self, rows: usize) {
         let m = self.near;
+        self.count(9 * rows * m);
         let Slots { force, linear, .. } = &mut self.values;
         let [x, y, z] = force;
         let force = [&x[..m], &y[..m], &z[..m]];

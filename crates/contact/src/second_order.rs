@@ -69,6 +69,12 @@ impl SecondOrder {
         }
     }
 
+    /// Units of work that the displacement of so many vertices under forces on so many takes.
+    pub(crate) fn work(&self, pushing: usize, moving: usize) -> usize {
+        let Self { modes: r, outputs: k, .. } = self;
+        3 * r * pushing + r * (r + 1) / 2 * k + r * r + 3 * k * moving
+    }
+
     /// Adds the displacement of `vertices`, mm, to `first`, into `moved`.
     pub(crate) fn displace(
         &self,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Settings, Solver};
 use papilla_proto::{
     atlas::{Atlas, MAP_SIDE_PX, Patch, Raster},
-    sdf::Placement,
+    sdf::{Placement, RoundedPlate},
 };
 
 use crate::shipped::{folder, text};
@@ -20,6 +20,9 @@ use thrown::{DEPTH_MM, Pad, shapes};
 const CLEAR_MM: f64 = 0.05;
 /// Linearisations at vertices, 16 steps of 3 and 25, twice if a frame starts anew; rounds on pixels.
 const ITERATIONS_MAX: u32 = 2 * (16 * 3 + 25 + 12);
+
+/// The budget of a frame, in units of work.
+const WORK_MAX: u64 = 1_400_000_000;
 
 /// No missed contact, no pressure in air, no tension, bounded work, whatever comes.
 fn throw_at(poses: usize, spacing: PixelSpacing) {
@@ -71,6 +74,25 @@ fn throw_at(poses: usize, spacing: PixelSpacing) {
     println!("{spacing:?}: {touching} of {poses} touch, {unsettled} unsettled, {outside} outside");
     println!("of each shape, and unsettled: {by_shape:?}");
     assert!(3 * touching > poses && 3 * unsettled < touching, "{touching} {unsettled}");
+}
+
+/// The rim of a wide plate far beside the pad: the forces of a first frame have a long way to go.
+#[test]
+fn a_plate_beside_the_map_settles_within_half_its_budget() {
+    let pad = Pad::of(&folder("models")).unwrap();
+    let plate = RoundedPlate { half_mm: [20.0, 20.0, 3.0], edge_radius_mm: 1.0 };
+    let Placement { rotation, .. } = Placement::turned(0.0, 45.0, 0.0, [0.0; 3]);
+    let (lowest, top) = (pad.model.lowest_mm(), [14.0, -16.0, 0.5]);
+    let origin_mm = [0, 1, 2].map(|i| lowest[i] + top[i] - rotation[i][2] * plate.half_mm[2]);
+    let object = Object::rigid(Arc::new(plate), Placement { rotation, origin_mm });
+    let mut solver = Solver::new(Arc::clone(&pad.model), Settings::default()).unwrap();
+    let mut out = Contact::new(pad.model.vertices());
+    let mut pixels = PixelContact::new(Arc::clone(&pad.skin), &pad.model, PixelSpacing::One);
+    solver.solve_on_pixels(&[object], &mut pixels, &mut out).unwrap();
+    let told = format!("{:?} {:?}", out.quality, out.effort);
+    println!("{told}");
+    assert!(out.quality.settled && pixels.peak_pa() > 0.0, "{told}");
+    assert!(out.effort.work < WORK_MAX / 2, "{told}");
 }
 
 /// A plate that reaches beyond the map: pixels go over into the vertices' pressure without a line.

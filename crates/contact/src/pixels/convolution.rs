@@ -16,6 +16,9 @@ pub(super) const LENGTH_MAX: usize = LENGTHS[LENGTHS.len() - 1];
 /// Steps of the pixels' distance, as a share of it: a frame like the last one needs no new table.
 const PITCH_STEP: f64 = 2.5e-3;
 
+/// Units of work that the compliance of one wave takes: a logarithm and an exponential.
+const WAVE: u64 = 60;
+
 /// Where pressure stands in a window.
 #[derive(Clone, Copy)]
 pub(super) struct Cells<'a> {
@@ -129,6 +132,12 @@ impl Convolution {
                 table[row] = table[self.rows - row];
             }
         }
+    }
+
+    /// Units of work that the table of a window takes, which counts in each frame: whether it is still
+    /// there from an earlier one is no matter of the frame.
+    pub(super) fn table_work(&self) -> u64 {
+        WAVE * ((self.rows / 2 + 1) * (self.columns / 2 + 1)) as u64
     }
 
     /// Units of work that a product takes: transforms there and back.

@@ -19,6 +19,8 @@ const VIOLATION_MM: f32 = 1e-4;
 const PRODUCTS_MAX: u32 = 80;
 /// The same, when the frame's budget is used.
 const PRODUCTS_MIN: u32 = 10;
+/// Units of work that a pixel takes with each product.
+const SOLVE: u64 = 16;
 
 impl PixelContact {
     pub(super) fn refine(
@@ -129,6 +131,7 @@ impl PixelContact {
         let model = &solver.model;
         let Self { skin, window, amplitudes, turns, pressure, of_vertices, .. } = self;
         window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
+        effort.work += window.work(model, solver.has_second_order());
         window.place(skin, model);
         window.measure_hats(skin, model);
         let (n, m) = (window.len(), window.free());
@@ -141,6 +144,7 @@ impl PixelContact {
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), window.rows(), pitch_mm, &skin.surface);
             window.number_cells(skin, [convolution.rows(), convolution.columns()]);
+            effort.work += window.opening_work() + convolution.table_work();
         }
         let Self { skin, window, convolution, bounded, turns, rubbing, .. } = self;
         let Self { rest, pressure, of_vertices, .. } = self;
@@ -168,7 +172,7 @@ impl PixelContact {
         let cells = window.cells(m);
         let beside = &window.beside[..m];
         let bends = convolution.bends();
-        let unit = convolution.work();
+        let unit = convolution.work() + SOLVE * m as u64;
         let is_warm = turns.starts_warm();
         let nearby = Nearby { convolution, cells, give, ease, norm, beside, bends, is_warm };
         let p = &mut pressure[..m];

@@ -8,12 +8,13 @@ const SHARE_MAX: f32 = 0.7;
 /// Rounds from which on they take only a part of what is left of the residual: flanks of narrow things
 /// push skin aside, which gives way up to ten times as far as pixels expect.
 const LATE: usize = 4;
-/// That part at first. A round whose residual is no less than [`FALLS`] of the one before takes
-/// [`LESS`] of it, any other one [`MORE`].
+/// That part at first. A round takes [`LESS`] of it where its residual points back from the one before,
+/// so that rounds go to and fro, and [`MORE`] where the cosine between them is above [`ONWARD`]: forces
+/// then have a long way to go, and how fast the residual falls tells nothing.
 const TAKEN: f32 = 0.45;
-const FALLS: f32 = 0.9;
+const ONWARD: f32 = 0.5;
 const LESS: f32 = 0.7;
-const MORE: f32 = 1.1;
+const MORE: f32 = 1.3;
 /// Least such part.
 const TAKEN_MIN: f32 = 0.1;
 /// How far the first one stays behind: over long distances skin gives way as far as over short
@@ -41,9 +42,8 @@ pub(super) struct Turns {
     active: Vec<u32>,
     is_active: Vec<bool>,
     rounds: usize,
-    /// Part of the residual that late rounds take, and the last round's change over the forces.
+    /// Part of the residual that late rounds take.
     taken: f32,
-    change: f32,
     /// Whether the next frame starts from this one, and this one from the last.
     warm: bool,
     started_warm: bool,
@@ -64,7 +64,6 @@ impl Turns {
             is_active: vec![false; vertices],
             rounds: 0,
             taken: TAKEN,
-            change: 0.0,
             warm: false,
             started_warm: false,
         }
@@ -167,6 +166,7 @@ impl Turns {
     pub(super) fn take(&mut self, force_n: &mut Vectors) -> f32 {
         let (mut change, mut size, mut was) = (0.0f32, 0.0f32, 0.0f32);
         let (mut along, mut square) = (0.0f32, 0.0f32);
+        let (mut onward, mut now_square, mut last_square) = (0.0f32, 0.0f32, 0.0f32);
         for (i, force) in force_n.iter().enumerate() {
             let (found, residual) = (&self.found[i], &mut self.residual[i]);
             for vertex in self.active.iter().map(|vertex| *vertex as usize) {
@@ -177,6 +177,9 @@ impl Turns {
                 was += force[vertex].abs();
                 along += now * by;
                 square += by * by;
+                onward += now * residual[vertex];
+                now_square += now * now;
+                last_square += residual[vertex] * residual[vertex];
                 residual[vertex] = now;
             }
         }
@@ -189,7 +192,7 @@ impl Turns {
         let share = if square > 0.0 { along / square } else { 0.0 };
         // NaN must not pass for nothing.
         let change = if size == 0.0 { 0.0 } else { change / size };
-        let late = self.late_part(change);
+        let late = self.late_part(onward / (now_square * last_square).sqrt());
         let (share, taken) = match self.rounds {
             0 => (0.0, 1.0 - FIRST),
             rounds => (share.clamp(-SHARE_MAX, SHARE_MAX), if rounds < LATE { 1.0 } else { late }),
@@ -214,14 +217,14 @@ impl Turns {
         change
     }
 
-    /// Part of the residual that a late round takes whose change is so large, over the forces.
-    fn late_part(&mut self, change: f32) -> f32 {
+    /// Part of the residual that a late round takes, by the cosine between its residual and the last one.
+    fn late_part(&mut self, cosine: f32) -> f32 {
         self.taken = match self.rounds {
             0 => TAKEN,
-            _ if change > FALLS * self.change => (LESS * self.taken).max(TAKEN_MIN),
-            _ => (MORE * self.taken).min(1.0),
+            _ if cosine < 0.0 => (LESS * self.taken).max(TAKEN_MIN),
+            _ if cosine > ONWARD => (MORE * self.taken).min(1.0),
+            _ => self.taken,
         };
-        self.change = change;
         self.taken
     }
 }

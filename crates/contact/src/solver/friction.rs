@@ -156,6 +156,7 @@ impl Friction {
         (scale, left): (f32, u32),
     ) -> u32 {
         let m = patch.near();
+        patch.count(9 * m * m);
         self.make_matrix(patch, made_for);
         for slot in 0..m {
             let [n, was] =

@@ -29,6 +29,7 @@ impl Solver {
             self.find_forces(view, 1.0 - 2.0 * taken, left, effort);
             relaxation = self.relax(relaxation, iteration == 0);
             change = self.follow() / relaxation.min(1.0);
+            effort.work += self.patch.take_work();
             if change <= settled_mm {
                 // Slots that carry no force have stood still meanwhile.
                 self.displace(self.patch.vertices().len());
@@ -43,6 +44,7 @@ impl Solver {
         }
         self.displace(self.patch.vertices().len());
         self.measure_all(view, effort);
+        effort.work += self.patch.take_work();
         change
     }
 
@@ -121,6 +123,9 @@ impl Solver {
         if self.made == m && !(0..m).any(turned) {
             return;
         }
+        // Along normals, and between two tangents.
+        let is_rough = self.friction.as_ref().is_some_and(|friction| friction.is_rough);
+        self.patch.count(if is_rough { 46 } else { 10 } * m * m);
         self.patch.along_normals(&mut self.matrix);
         self.norm = Symmetric::new(&self.matrix, self.patch.stride(), m).norm;
         for (kept, normal) in self.made_for.iter_mut().zip(&self.patch.values.normal) {

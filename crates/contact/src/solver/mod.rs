@@ -291,7 +291,9 @@ impl Solver {
 
     /// Ends a frame of things in given places: force that has fallen on a straight way in is told.
     pub(crate) fn end_frame(&mut self, view: View<'_>, out: &mut Contact) {
-        out.quality.settled &= !self.sides.has_faded(out.force_n);
+        let has_faded = self.sides.has_faded(out.force_n);
+        out.quality.has_faded = out.quality.settled && has_faded;
+        out.quality.settled &= !has_faded;
         self.follow_slip(view);
     }
 
@@ -381,6 +383,7 @@ impl Solver {
         self.choose_near();
         self.remake_matrix();
         self.find_forces(view, 1.0, PRODUCTS_MAX, effort);
+        effort.work += self.patch.take_work();
     }
 
     /// Whether what came out is finite.
@@ -396,6 +399,8 @@ impl Solver {
             out.shear_pa.resize(self.model.vertices(), [0.0; 3]);
         }
         out.clear();
+        // What was done between frames is no part of this one.
+        self.patch.take_work();
         let is_far = self.find_candidates(view, &mut out.effort);
         let seen = Seen { candidates: &self.candidates, is_far };
         sides.judge(&self.model, view, seen, &mut out.effort);
@@ -425,6 +430,7 @@ impl Solver {
         // another one, on the far side of something thin.
         if self.candidates.iter().all(|(free, _)| *free > 0.0) {
             self.patch.clear();
+            out.effort.work += self.patch.take_work();
             self.made = 0;
             return true;
         }
@@ -434,6 +440,7 @@ impl Solver {
         }
         self.keep_candidates();
         self.displace(self.patch.vertices().len());
+        out.effort.work += self.patch.take_work();
         self.approach(view, &mut out.effort);
         let change = self.iterate(view, until, &mut out.effort);
         if !change.is_finite() {
@@ -460,6 +467,7 @@ impl Solver {
         self.patch.displace(rows);
         let m = self.patch.near();
         if let (Some(a), Some(s)) = (&mut self.amplitudes, &self.model.second_order) {
+            self.patch.count(s.work(m, rows));
             let [x, y, z] = &self.patch.values.force;
             s.evaluate(&self.patch.vertices()[..m], [&x[..m], &y[..m], &z[..m]], a);
         }
@@ -543,6 +551,7 @@ impl Solver {
         let along = out.force_n.map(|f| (f / size) as f32);
         let scale = 1.0 - 2.0 * self.share_taken();
         self.remake_matrix();
+        out.effort.work += self.patch.take_work();
         let entries = self.entries();
         let most = view.most(PRODUCTS_MAX, entries, &out.effort).max(PRODUCTS_MIN);
         let Self { patch, matrix, norm, rest, bounded, .. } = self;

@@ -61,6 +61,32 @@ fn a_frame_of_costly_shapes_on_pixels_keeps_its_budget() {
     assert!(a == b, "another answer the second time");
 }
 
+/// A wide contact holds the compliance between all vertices that may touch: what is read for it counts,
+/// beside distances and products.
+#[test]
+fn a_first_frame_counts_what_it_reads() {
+    let finger = Finger::new();
+    let wide: (Arc<dyn SignedDistance>, f64) = (Arc::new(Sphere { radius_mm: 40.0 }), 40.0);
+    let vertex = finger.lowest();
+    let throw = Throw { vertex, depth_mm: 0.02, tilt_deg: [0.0; 2], spin_deg: 0.0 };
+    let mut solver = Solver::new(finger.model.clone(), Settings::default()).expect("a solver");
+    let mut out = Contact::new(finger.model.vertices());
+    let object = [finger.place(&wide, throw)];
+    let [first, next] = [0, 1].map(|_| {
+        solver.solve(&object, &mut out).expect("an answer");
+        out.effort
+    });
+    let held = u64::from(first.candidates);
+    let told = format!("{first:?} {next:?}");
+    assert!(held > 50 && first.work > next.work, "{told}");
+    // Nine components of each pair, in a row and in a column.
+    let read = 9 * held * (held + 1);
+    let distances = 25 * u64::from(first.distances);
+    assert!(first.work >= read + distances, "{told}");
+    // Products are too few to make up for it.
+    assert!(read > u64::from(first.products) * held.pow(2), "{told}");
+}
+
 /// Beside the finger and deep in it, and among costly shapes, where each frame tried has nearly all of it.
 #[test]
 fn a_search_for_a_net_force_has_one_budget() {

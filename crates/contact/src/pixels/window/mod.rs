@@ -18,6 +18,9 @@ use papilla_atlas::MAP_SIDE_PX;
 /// Pixels of the map between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
 const NONE: u32 = u32::MAX;
+/// Units of work that a pixel takes when a window is opened, and in each round.
+const OPEN: usize = 100;
+const PLACE: usize = 200;
 
 /// Pixels that things are near, and the vertices that move them.
 #[derive(Debug)]
@@ -138,6 +141,22 @@ impl Window {
 
     pub(super) fn len(&self) -> usize {
         self.entries.len()
+    }
+
+    /// Units of work of a round beside transforms, distances and products: moving the vertices and
+    /// placing the pixels, and passing pressure to vertices and back.
+    pub(super) fn work(&self, model: &ContactModel, has_second_order: bool) -> u64 {
+        let (pushing, moving) = (self.push.vertices().len(), self.ids.len());
+        let second_order = model.second_order.as_ref().filter(|_| has_second_order);
+        let bent = second_order.map_or(0, |of| of.work(pushing, moving));
+        (9 * pushing * moving + bent + PLACE * self.entries.len()) as u64
+    }
+
+    /// The same of opening the window: choosing pixels and vertices, and reading the compliance between
+    /// those that push and those that move. It counts in each frame, whether or not some of it is still
+    /// known from an earlier one.
+    pub(super) fn opening_work(&self) -> u64 {
+        (18 * self.push.vertices().len() * self.ids.len() + OPEN * self.entries.len()) as u64
     }
 
     /// How many pixels, the first, are solved for; the others are held.
