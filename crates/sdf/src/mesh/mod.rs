@@ -40,7 +40,7 @@ const AWAY_MM: f64 = 0.5;
 const PER_TRIANGLE: f64 = 2.5;
 /// Time of a box or triangle of a winding number, in those of a sphere's distance, times the share of
 /// places that are nearest to an edge: only these ask for it.
-const PER_WINDING: f64 = 0.6;
+const PER_WINDING: f64 = 0.1;
 /// Most of the places whose nearest triangle and winding number may differ about the side.
 const UNSURE: f64 = 0.1;
 
