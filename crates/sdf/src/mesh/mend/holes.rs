@@ -11,6 +11,8 @@ const CRACK: f64 = 1e-4;
 const STEPS: i32 = 8;
 /// Halvings that find where it is one half.
 const HALVINGS: u32 = 24;
+/// Winding numbers that a hole asks for at most.
+pub(super) const LOOKS: u64 = 4 * STEPS as u64 + 2 * HALVINGS as u64;
 /// The middle of a hole is left in its plane if it is no farther off, in radii of the hole: the
 /// winding number is not more exact.
 const PLANE: f64 = 0.03;

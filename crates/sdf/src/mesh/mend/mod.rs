@@ -89,8 +89,10 @@ pub(super) fn body(mesh: &Mesh, go_on: &dyn Fn() -> bool) -> Result<Body, MeshEr
     let rims = holes::rims(&triangles);
     let open = (!rims.is_empty()).then(|| Winding::new(places.clone()));
     let mut mended = Mended { turned, covered: doubled, ..Mended::default() };
+    let mut work = Work::new(8 * own, go_on);
     if let Some(open) = &open {
         for rim in &rims {
+            work.spend(holes::LOOKS * WORK_OF_WINDING)?;
             let rim: Vec<_> = rim.iter().map(|c| corners_mm[*c as usize]).collect();
             match holes::fan(&rim, open) {
                 Some(fan) => {
@@ -102,7 +104,6 @@ pub(super) fn body(mesh: &Mesh, go_on: &dyn Fn() -> bool) -> Result<Body, MeshEr
         }
     }
     let tree = Tree::new(&places);
-    let mut work = Work::new(4 * places.len(), go_on);
     let pieces = cut::pieces(&places, &tree, &mut work)?;
     let winding = Winding::new(places);
     let kept = Kept::of(&pieces, [&winding, open.as_ref().unwrap_or(&winding)], own, &mut work)?;

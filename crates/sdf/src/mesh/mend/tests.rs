@@ -275,6 +275,25 @@ fn mending_is_bounded_and_can_be_stopped() {
 }
 
 #[test]
+fn a_heap_of_loose_triangles_is_refused_within_bounds() {
+    let corner = |k: u32| {
+        let at = |n: u32| f64::from(k.wrapping_mul(n) % 1009) / 100.0;
+        [at(7919), at(6101), at(4999)]
+    };
+    let vertices_mm = (0..9000).map(corner).collect();
+    let triangles = (0..3000).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let asked = std::cell::Cell::new(0u32);
+    let heap = Mesh { vertices_mm, triangles };
+    let error = heap.build_until(&|| {
+        asked.set(asked.get() + 1);
+        true
+    });
+    assert!(error.is_err());
+    // It is asked before each few holes.
+    assert!(asked.get() > 100, "{}", asked.get());
+}
+
+#[test]
 fn what_was_done_is_said() {
     let said = Mended { holes: 1, cracks: 2, turned: 1, covered: 3 }.to_string();
     for words in [
