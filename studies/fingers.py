@@ -3,18 +3,23 @@
 
     python studies/fingers.py solve [NAME...]     solves the presses of studies/fingers/NAME.toml: core hours
     python studies/fingers.py measure [NAME...]   teaches each finger with the first 10, 25, 50 and 100 of those
-                                                  that are solved, and writes the table and the plot
+                                                  that are solved
+    python studies/fingers.py report [NAME...]    writes the table and the plot of what is measured
 
-A finger's bundle stands in --out (out/fingers) and goes on where it was stopped. `solve` may be done
-by `fe-datagen generate` on a cluster instead: the campaign is OUT/NAME/teach/campaign.toml. `measure`
-may run beside it: it works on copies of the presses that are there, in OUT/NAME-COUNT.
+A finger's bundle stands in --out (out/fingers) and goes on where it was stopped. Whoever puts a bundle
+there before, such as studies/hand_model.py, has it measured too. `solve` may be done by `fe-datagen
+generate` on a cluster instead: the campaign is OUT/NAME/teach/campaign.toml. `measure` may run beside
+it: it works on copies of the presses that are there, in OUT/NAME-COUNT.
 
-All networks of a finger are judged on the same held-out presses: those of as many as are solved. Before
-the first one is learnt from, they are the default finger's networks by similarity alone. Errors are
-those of the network that is served: from pressure the default for pressure, from poses the default.
+All fingers are judged on the same presses, which no network learns from: every second or third of those
+that the default finger's networks are judged on, with depths in proportion to the soft tissue below
+the pad and offsets in proportion to the width. So the default finger's own error on them stands beside
+each. Before the first press of a finger is learnt from, its networks are the default finger's by similarity
+alone. Errors are those of the network that is served: from pressure the default for pressure, from
+poses the default.
 
 Needs numpy, matplotlib, the trainer's requirements, and the programs fe-datagen and model-export:
-FE_DATAGEN and MODEL_EXPORT, or PATH. Run it in the root of the repository.
+FE_DATAGEN, MODEL_EXPORT and PYTHON, or PATH. Run it in the root of the repository.
 """
 
 import argparse
@@ -25,14 +30,23 @@ import resource
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
+
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 FINGERS = ROOT / "studies/fingers"
 MODELS = ROOT / "models"
 COUNTS = (10, 25, 50, 100)
-# As `finger teach` judges poses, and as models/contact.json calls it.
-METHOD = ("second order, pixels", "pixels")
+# Presses that are solved by one call.
+TOGETHER = 5
+# Where the held-out presses come from, with the campaign of that dataset, and how many are taken.
+JUDGES, JUDGES_CAMPAIGN, JUDGED_BY = ROOT / "data/broad-graded", ROOT / "campaigns/broad-graded.toml", 8
+# As `finger teach` judges poses.
+METHOD = "second order, pixels"
+# `fe-datagen generate` ends with it where a state was dropped, which the dataset then lists.
+DROPPED = 3
 BAR = 1.3
 KINDS = ("pressure_to_sed", "pose_to_sed")
 
@@ -44,11 +58,14 @@ def program(variable: str, name: str) -> str:
     return found
 
 
-def run(*words, keep: bool = False) -> str:
+def run(*words, keep: bool = False, accepted: tuple[int, ...] = (0,)) -> str:
     words = [str(word) for word in words]
     print("+", *words, file=sys.stderr, flush=True)
     stdout = subprocess.PIPE if keep else None
-    return subprocess.run(words, check=True, cwd=ROOT, stdout=stdout, text=True).stdout
+    done = subprocess.run(words, check=False, cwd=ROOT, stdout=stdout, text=True)
+    if done.returncode not in accepted:
+        sys.exit(f"{words[0]} {words[1]}: ended with {done.returncode}; the same command goes on from here")
+    return done.stdout
 
 
 def asked(*words):
@@ -63,18 +80,49 @@ def defaults() -> dict:
     return {"pressure_to_sed": index.get("default_for_pressure", pose), "pose_to_sed": pose}
 
 
-def own_errors(networks: dict) -> dict:
-    """What the default finger's networks err on held-out presses of their own finger."""
-    card = json.loads((MODELS / f"{networks['pressure_to_sed']}.json").read_text())
-    contact = json.loads((MODELS / "contact.json").read_text())
-    if contact["network"] != networks["pose_to_sed"]:
-        sys.exit(f"models/contact.json is of {contact['network']}, not of {networks['pose_to_sed']}")
-    (method,) = (of for of in contact["methods"] if of["name"] == METHOD[1])
-    # The first set is that of the card: presses of the shapes that were learnt.
-    return {
-        "pressure_to_sed": card["metrics"]["relative_l2"],
-        "pose_to_sed": method["errors"][0]["sed_relative_l2"],
+def judges() -> list[dict]:
+    """Some of the presses that the default finger's networks are judged on, evenly spaced among them."""
+    manifest = json.loads((JUDGES / "manifest.json").read_text())
+    held_out = [press for press in manifest["presses"] if press["split"] == "test"]
+    return [held_out[k * len(held_out) // JUDGED_BY] for k in range(JUDGED_BY)]
+
+
+def judges_campaign(out: Path) -> Path:
+    """A campaign of these presses, for the default finger: an indenter for each, in one pose alone."""
+    campaign = tomllib.loads(JUDGES_CAMPAIGN.read_text())
+    indenters = {of["name"]: of["indenter"] for of in campaign["indenters"]}
+    lines = ['name = "held-out"', "seed = 1", f"presses = {JUDGED_BY}", "test_fraction = 0.0"]
+    lines += [f"{key} = {json.dumps(campaign[key])}" for key in ("density", "order", "effects")]
+    lines += ["depths = { deepest_mm = [1.0, 1.0], states = 2 }"]
+    alone = "pitch_deg = [{0}, {0}], roll_deg = [{1}, {1}], yaw_deg = [{2}, {2}]"
+    lines += ["pose = { " + alone.format(0.0, 0.0, 0.0) + " }"]
+    for press in judges():
+        with np.load(JUDGES / press["file"]) as shard:
+            deepest = float(shard["depth_mm"].max())
+        pose = alone.format(*(press[angle] for angle in ("pitch_deg", "roll_deg", "yaw_deg")))
+        shape = ", ".join(f"{key} = {json.dumps(value)}" for key, value in indenters[press["indenter"]].items())
+        lines += ["[[indenters]]", f'name = "{press["indenter"]}, {press["id"]}"', f"indenter = {{ {shape} }}"]
+        lines += [f"pose = {{ {pose} }}", f"offset_mm = {[[by, by] for by in press['offset_mm']]}"]
+        lines += [f"depths = {{ deepest_mm = [{deepest}, {deepest}], states = 2 }}"]
+    path = out / "held-out.toml"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def judge(dataset: Path, ids: list[int], view: Path) -> Path:
+    """A view of a dataset in which these presses are held out, and no others."""
+    manifest = json.loads((dataset / "manifest.json").read_text())
+    for press in manifest["presses"]:
+        press["split"] = "test" if press["id"] in ids else "train"
+    manifest["splits"] = {
+        split: [press["id"] for press in manifest["presses"] if press["split"] == split] for split in ("train", "test")
     }
+    shutil.rmtree(view, ignore_errors=True)
+    view.mkdir(parents=True)
+    for name in ("atlas.json", "raster.npz", "shards"):
+        (view / name).symlink_to(dataset / name)
+    (view / "manifest.json").write_text(json.dumps(manifest))
+    return view
 
 
 def bundle(out: Path, name: str) -> Path:
@@ -97,12 +145,13 @@ def solved(folder: Path) -> int:
     return count
 
 
-def copied(folder: Path, presses: int, contact: bool) -> Path:
+def copied(folder: Path, presses: int, contact: bool, suffix: str = "") -> Path:
     """A bundle with the first presses of another one alone, ready to be taught with them."""
-    own = folder.with_name(f"{folder.name}-{presses}")
-    names = ["finger.toml", "teach/presses/progress/campaign.json"]
-    names += [f"teach/presses/{name}" for name in ("atlas.json", "raster.npz")]
-    names += ["skin.json"]
+    own = folder.with_name(f"{folder.name}-{suffix or presses}")
+    names = ["finger.toml"]
+    if presses:
+        names += [f"teach/presses/{name}" for name in ("atlas.json", "raster.npz", "progress/campaign.json")]
+    names += ["skin.json", "fit.json"]
     names += ["atlas.json", "finger.contact"] if contact else []
     for press in range(presses):
         names += [f"teach/presses/shards/press-{press:05}.npz"]
@@ -144,29 +193,51 @@ def built(folder: Path) -> float:
     return json.loads(note.read_text())["processor_s"] / 3600.0
 
 
-def errors(models: dict, judge: Path, contact: bool, similarity: bool) -> dict:
-    """Errors of networks on the held-out presses of a bundle."""
-    export, presses = program("MODEL_EXPORT", "model-export"), judge / "teach/presses"
+def errors(models: dict, presses: Path, contact: Path | None, finger: Path | None, similarity: bool) -> dict:
+    """Errors of networks on the held-out presses of a dataset; without a finger, of the default one."""
+    export = program("MODEL_EXPORT", "model-export")
     also = ["--similarity"] if similarity else []
     card = asked(export, "--json", "evaluate", models["pressure_to_sed"], presses, *also)["card"]
     found = {"states": card["metrics"]["samples"], "pressure_to_sed": card["metrics"]["relative_l2"]}
     found |= {"pose_to_sed": None, "pose_to_pressure": None}
     if contact:
-        words = ("contact", judge / "finger.contact", presses, "--finger", judge)
-        words += ("--method", METHOD[0], "--network", models["pose_to_sed"])
+        words = ["contact", contact, presses, *(["--finger", finger] if finger else [])]
+        words += ["--method", METHOD, "--network", models["pose_to_sed"]]
         (row,) = asked(export, "--json", *words, *also)
         for key, of in (("pose_to_sed", "sed"), ("pose_to_pressure", "pressure")):
             found[key] = dict(zip(("median", "p95"), row[of], strict=True))
     return found
 
 
+def planned(folder: Path, presses: int, *more) -> Path:
+    """The campaign of a bundle, of at least so many presses."""
+    campaign = folder / "teach/campaign.toml"
+    if not campaign.is_file() or tomllib.loads(campaign.read_text())["presses"] < presses:
+        run(program("FE_DATAGEN", "fe-datagen"), "finger", "teach", folder, "--plan", "--presses", presses, *more)
+    return campaign
+
+
+def held_out(options, name: str) -> Path:
+    """The held-out presses of a finger, solved."""
+    folder = copied(bundle(options.out, name), 0, contact=False, suffix="held-out")
+    campaign = planned(folder, JUDGED_BY, "--campaign", judges_campaign(options.out))
+    presses = folder / "teach/presses"
+    words = ("generate", campaign, "--out", presses, "--threads", options.threads)
+    run(program("FE_DATAGEN", "fe-datagen"), *words, accepted=(0, DROPPED))
+    return judge(presses, list(range(JUDGED_BY)), folder / "judge")
+
+
 def solve(options) -> None:
-    datagen = program("FE_DATAGEN", "fe-datagen")
     for name in options.fingers:
+        held_out(options, name)
         folder = bundle(options.out, name)
-        run(datagen, "finger", "teach", folder, "--plan", "--presses", options.presses)
-        campaign = folder / "teach/campaign.toml"
-        run(datagen, "generate", campaign, "--out", folder / "teach/presses", "--threads", options.threads)
+        if not options.presses:
+            continue
+        campaign = planned(folder, max(COUNTS[-1], options.presses))
+        slices = tomllib.loads(campaign.read_text())["presses"] // TOGETHER
+        for k in range(-(-options.presses // TOGETHER)):
+            words = ("--out", folder / "teach/presses", "--threads", options.threads, "--slice", f"{k + 1}/{slices}")
+            run(program("FE_DATAGEN", "fe-datagen"), "generate", campaign, *words, accepted=(0, DROPPED))
 
 
 def measured(options, name: str) -> dict:
@@ -175,18 +246,12 @@ def measured(options, name: str) -> dict:
     if not contact:
         networks["pose_to_sed"] = networks["pressure_to_sed"]
     folder = bundle(options.out, name)
-    there = solved(folder)
-    counts = [count for count in COUNTS if count <= min(there, options.presses)]
-    if not counts:
-        sys.exit(f"{folder}: {there} presses are solved, and {COUNTS[0]} are the fewest")
+    counts = [count for count in COUNTS if count <= min(solved(folder), options.presses)]
     contact_hours = built(folder) if contact else 0.0
-    # The held-out presses of all that is solved are the judge.
-    judge = copied(folder, counts[-1], contact)
-    run(datagen, "finger", "teach", judge, "--plan", "--presses", counts[-1])
-    run(datagen, "generate", judge / "teach/campaign.toml", "--out", judge / "teach/presses", "--threads", "1")
+    on = (held_out(options, name), folder / "finger.contact" if contact else None, folder)
     start = {kind: MODELS / f"{network}.onnx" for kind, network in networks.items()}
     nothing = {"presses": 0, "contact": contact_hours, "training": 0.0}
-    rows = [{"presses": 0, "learnt": 0, "core_hours": nothing, **errors(start, judge, contact, True)}]
+    rows = [{"presses": 0, "learnt": 0, "core_hours": nothing, **errors(start, *on, True)}]
     for count in counts:
         part = copied(folder, count, contact)
         words = ["--presses", count, "--threads", options.threads, "--json"]
@@ -201,8 +266,9 @@ def measured(options, name: str) -> dict:
             "training": training_hours(part, networks),
         }
         learnt = report["presses"] - report["held_out"]
-        rows.append({"presses": count, "learnt": learnt, "core_hours": took, **errors(own, judge, contact, False)})
-    default = own_errors(networks)
+        rows.append({"presses": count, "learnt": learnt, "core_hours": took, **errors(own, *on, False)})
+    own_judge = judge(JUDGES, [press["id"] for press in judges()], options.out / "judge")
+    default = errors(start, own_judge, MODELS / "finger.contact" if contact else None, None, False)
     return {"finger": name, "networks": networks, "default_finger": default, "rows": rows}
 
 
@@ -266,9 +332,18 @@ def plot(found: list[dict], path: Path) -> None:
 
 
 def measure(options) -> None:
-    found = [measured(options, name) for name in options.fingers]
-    for path, text in (("fingers.json", json.dumps(found, indent=2) + "\n"), ("fingers.md", table(found))):
-        (options.out / path).write_text(text)
+    for name in options.fingers:
+        text = json.dumps(measured(options, name), indent=2) + "\n"
+        (options.out / f"{name}.json").write_text(text)
+    report(options)
+
+
+def report(options) -> None:
+    files = (options.out / f"{name}.json" for name in options.fingers)
+    found = [json.loads(file.read_text()) for file in files if file.is_file()]
+    if not found:
+        sys.exit(f"{options.out}: nothing is measured")
+    (options.out / "fingers.md").write_text(table(found))
     plot(found, options.out / "fingers.svg")
     print(table(found))
 
@@ -278,15 +353,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("command", choices=("solve", "measure"))
+    parser.add_argument("command", choices=("solve", "measure", "report"))
     parser.add_argument("fingers", nargs="*", default=names, metavar="NAME", help=", ".join(names))
     parser.add_argument("--out", type=Path, default=ROOT / "out/fingers", help="folder of bundles, older ones go on")
-    parser.add_argument("--presses", type=int, default=COUNTS[-1], help="solve so many; measure at most so many")
+    parser.add_argument("--presses", type=int, default=COUNTS[-1], help="solve so many; measure at most so many, 0: similarity alone")
     parser.add_argument("--threads", default="1", help="presses at a time, and threads of a training")
     parser.add_argument("--without-contact", action="store_true", help="pressure to SED alone")
     options = parser.parse_args()
     options.out = options.out.resolve()
-    {"solve": solve, "measure": measure}[options.command](options)
+    options.out.mkdir(parents=True, exist_ok=True)
+    {"solve": solve, "measure": measure, "report": report}[options.command](options)
 
 
 if __name__ == "__main__":

@@ -56,6 +56,8 @@ class Finger:
             read.setdefault(table, {}).update(own)
         if "skin" in read["shape"]:
             sys.exit(f"{file}: names a skin's offset, which this study does not know")
+        if any(isinstance(thickness, list) for thickness in read["layers"].values()):
+            sys.exit(f"{file}: has the map of a layer, which this study does not know")
         self.shape, self.layer, self.rod, self.plate = (read[k] for k in ("shape", "layers", "bone", "nail"))
         self.length, self.cap = self.shape["length_mm"], self.shape["cap_length_mm"]
         self.half = 0.5 * self.shape["width_mm"], 0.5 * self.shape["height_mm"]
