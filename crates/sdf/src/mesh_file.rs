@@ -26,6 +26,7 @@ pub enum LengthUnit {
     Inch,
 }
 
+#[cfg(feature = "files")]
 impl LengthUnit {
     const fn mm(self) -> f64 {
         match self {
