@@ -27,8 +27,11 @@ fn data<'a>(deck: &'a str, keyword: &str) -> Vec<&'a str> {
 #[test]
 fn a_scene_becomes_a_whole_deck() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("deck/layered-block.inp");
-    let done = export(&shipped("layered-block.toml"), &folder.path().join("deck"));
+    // What follows a full stop belongs to the scene's name.
+    let scene = folder.path().join("block-0.3.toml");
+    std::fs::copy(shipped("layered-block.toml"), &scene).unwrap();
+    let out = folder.path().join("deck/block-0.3.inp");
+    let done = export(&scene, &folder.path().join("deck"));
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let deck = std::fs::read_to_string(&out).unwrap();
     assert_eq!(data(&deck, "*NODE, NSET=NBODY").len(), 25 * 25 * 10);

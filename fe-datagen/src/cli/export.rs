@@ -46,7 +46,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let title = args.scene.display().to_string();
     let deck = exported.deck(&title, types);
     let stem = args.scene.file_stem().context("a scene file has a name")?;
-    let path = args.out.join(stem).with_extension("inp");
+    let path = args.out.join(stem).with_added_extension("inp");
     atomic::create_folder(&args.out)?;
     atomic::write(&path, deck.to_text()?.as_bytes())?;
     println!(
