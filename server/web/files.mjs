@@ -1,17 +1,18 @@
 // What comes in and goes out as a file or a text: a mesh of the visitor's own, and what is taken along.
 
-import { meshOf } from './mesh.mjs';
+import { meshOf, MM_PER_M } from './mesh.mjs';
 import { byId } from './notice.mjs';
 import { save } from './share.mjs';
 
-/** A file whose size could be a finger's keeps it; one that has such a size in metres is taken in metres. */
 const PLAUSIBLE_MM = { least: 3, most: 30 };
 const OTHERWISE_MM = 10;
-const MM_PER_M = 1000;
 
 const isPlausible = (mm) => mm >= PLAUSIBLE_MM.least && mm <= PLAUSIBLE_MM.most;
 
-/** The greatest side that a mesh is given, mm, and why, in words. */
+/**
+ * The greatest side that a mesh is given, mm, and why, in words. A file whose size could be a thing's on a finger keeps it; one
+ * that has such a size in metres is taken in metres.
+ */
 export function sizeFor(sideMm) {
   const own = Number(sideMm.toFixed(2));
   if (isPlausible(sideMm)) return [own, 'its own size'];

@@ -10,7 +10,7 @@ const GLB_BIN = 0x004e4942;
 const FLOAT = 5126;
 const INDEX = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array };
 const TRIANGLES = 4;
-const MM_PER_M = 1000;
+export const MM_PER_M = 1000;
 const STL_HEAD = 84;
 const STL_FACET = 50;
 /** Corners closer than this share of the greatest side are one vertex. */

@@ -25,7 +25,7 @@ pub(crate) type Shared = State<Arc<App>>;
 pub(crate) type Answer = Result<Response, HttpProblem>;
 
 /// Counts a refusal and makes it the answer.
-pub(crate) fn refuse(app: &App, problem: Problem) -> Answer {
+pub(crate) fn refuse<T>(app: &App, problem: Problem) -> Result<T, HttpProblem> {
     app.metrics.error(problem.code);
     Err(HttpProblem(problem))
 }

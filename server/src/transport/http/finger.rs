@@ -84,10 +84,7 @@ impl FromRequestParts<Arc<App>> for Asked {
             Some(caller) => asked(app, caller, &parts.uri).await,
             None => Err(problem::internal("nobody is known to ask", &"no gate in front")),
         };
-        finger.map(Self).map_err(|problem| {
-            app.metrics.error(problem.code);
-            HttpProblem(problem)
-        })
+        finger.map(Self).or_else(|problem| refuse(app, problem))
     }
 }
 

@@ -98,11 +98,11 @@ fn below(asked: &Uri) -> Option<PathAndQuery> {
 }
 
 fn broken(app: &App, error: &dyn std::fmt::Display) -> Response {
-    refuse(app, problem::internal("the file cannot be read", error)).into_response()
+    refuse::<Response>(app, problem::internal("the file cannot be read", error)).into_response()
 }
 
 fn missing(app: &App, path: &str) -> Response {
     let problem =
         Problem::new(ErrorCode::NotFound, format!("there is nothing at {}", shortened(path)));
-    refuse(app, problem).into_response()
+    refuse::<Response>(app, problem).into_response()
 }
