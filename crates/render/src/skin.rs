@@ -1,6 +1,7 @@
 //! Which pixels show skin.
 
 use papilla_proto::{MAP_SIDE_PX, PixelMask, atlas::Raster};
+use papilla_session_contact::Finger;
 
 /// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
 /// zero there in all of them.
@@ -26,6 +27,12 @@ impl SkinPixels {
     pub fn are_cut_off(&self, pressure_pa: &[f32], peak_pa: f32) -> bool {
         let least_pa = RIM_SHARE * peak_pa;
         self.rim.iter().any(|&i| pressure_pa.get(i).is_some_and(|p| *p > least_pa))
+    }
+
+    /// The same of the pressure that a finger's contact found, whose map has not been drawn.
+    #[must_use]
+    pub fn are_cut_off_in(&self, finger: &Finger) -> bool {
+        finger.presses_on(&self.rim, RIM_SHARE)
     }
 }
 

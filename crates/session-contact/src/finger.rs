@@ -7,7 +7,7 @@ use papilla_contact::{
     Contact, ContactModel, NetForce, Object, Person, PixelContact, Scene, ShearEnergy,
 };
 use papilla_proto::{
-    ErrorCode, Hello, MAP_LEN, PressureRange, Problem, RuntimeEffect, SampleType,
+    ErrorCode, Hello, MAP_LEN, MAP_SIDE_PX, PressureRange, Problem, RuntimeEffect, SampleType,
     atlas::Raster,
     contact::{ContactMethod, Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
     effects::OutOfRange,
@@ -337,6 +337,24 @@ impl Finger {
             .filter(|_| peak_pa > 0.0)
             .and_then(|method| Felt::of(method, &self.out, self.person));
         Taken { peak_pa, flags, iterations, felt }
+    }
+
+    /// Whether the pressure that was found exceeds `share` of its greatest at one of these pixels of
+    /// the map (row by row), without drawing the map.
+    #[must_use]
+    pub fn presses_on(&self, pixels: &[usize], share: f32) -> bool {
+        let least_pa = share * self.touch.pressure_max_pa;
+        if self.is_lost || self.form.input == Input::Pressure || least_pa <= 0.0 {
+            return false;
+        }
+        let on_map = self.pixels().map(PixelContact::map_pa);
+        pixels.iter().any(|&index| match on_map {
+            Some(map_pa) => map_pa.get(index).is_some_and(|pa| *pa > least_pa),
+            None => {
+                let pixel = self.raster.at(index / MAP_SIDE_PX, index % MAP_SIDE_PX);
+                pixel.is_some_and(|pixel| pixel.value(&self.out.pressure_pa) > least_pa)
+            }
+        })
     }
 
     fn pixels(&self) -> Option<&PixelContact> {

@@ -8,6 +8,7 @@ mod broken;
 mod clocks;
 mod contact;
 mod drain;
+mod edge;
 mod effects;
 mod fingers;
 mod first_use;
