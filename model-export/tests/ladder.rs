@@ -61,6 +61,7 @@ fn every_rung_has_the_known_errors() {
         ("heldout-shapes", 0),
         ("reference", 6),
         ("reference-anew", 0),
+        ("reference-shapes", 0),
         ("pressed", 0),
         ("s1", 3),
         ("poses", 0),

@@ -14,7 +14,7 @@ is stale, every key that no source has, and where models/contact.json is not the
 Keys of networks and of finite-element rows: NAME.SET is the median relative L2 of strain energy
 density (SED), NAME.SET.p95 its 95th percentile, NAME.SET.far the error away from the contact, NAME.SET.peak
 that of the greatest SED, NAME.ms the time of a map on one core, NAME.s that of a state. Sets:
-reference, reference-anew, broad, unseen, pressed, s1, with the pressure of FE; poses, with the
+reference, reference-anew, reference-shapes, broad, unseen, pressed, s1, with the pressure of FE; poses, with the
 pressure that contact finds from poses. reference.error and teacher.pressure are what
 the truths err themselves. Keys of contact: contact.METHOD.SET.QUANTITY
 and the same with .p95; quantities are pressure, force, sed, us (processor time of a warm frame).
@@ -36,6 +36,7 @@ MARK = re.compile(r"(<!-- =([\w.-]+) -->)([^<]*)(<!-- / -->)")
 SETS = {
     "reference": "reference",
     "reference-anew": "reference-anew",
+    "reference-shapes": "reference-shapes",
     "heldout-presses": "broad",
     "heldout-shapes": "unseen",
     "pressed": "pressed",

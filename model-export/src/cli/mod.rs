@@ -106,12 +106,13 @@ enum Command {
     Patterns(patterns::Options),
     /// Measure the ladder: error against time of every model and of FE itself.
     ///
-    /// Every model of the index is run on all held-out sets (held-out indentations, held-out shapes,
-    /// pressed hard, the published campaign, the states of the FE reference); FE rungs
-    /// are held against the reference. The sets are the datasets `broad-graded`, `heldout-graded`,
-    /// `pressed-graded`, `final`, `final-anew` and `s1-graded` in DATA; `friction-graded` and
-    /// `sliding-graded` there say what traction is worth. Written: a page with tables and pictures, the figures as
-    /// JSON, and the same as MODELS/ladder.json, by which the server chooses.
+    /// Every model of the index is run on all held-out sets (held-out indentations, held-out
+    /// shapes, pressed hard, the published campaign, the states of the FE reference); FE rungs are
+    /// held against the reference. The sets are the datasets `broad-graded`, `heldout-graded`,
+    /// `pressed-graded`, `final`, `final-anew`, `final-shapes` and `s1-graded` in DATA; `friction-
+    /// graded` and `sliding-graded` there say what traction is worth. Written: a page with tables
+    /// and pictures, the figures as JSON, and the same as MODELS/ladder.json, by which the server
+    /// chooses.
     #[command(after_long_help = EXIT_CODES)]
     Ladder(ladder::Options),
     /// Measure the shipped models on this machine, in each engine, in about a minute.

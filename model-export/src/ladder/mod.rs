@@ -34,7 +34,8 @@ pub const QUICK_SAMPLES: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Task {
     /// Folder that holds the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final`,
-    /// `final-anew`, `s1-graded`, and of presses with friction `friction-graded` and `sliding-graded`.
+    /// `final-anew`, `final-shapes`, `s1-graded`, and of presses with friction `friction-graded` and
+    /// `sliding-graded`.
     pub data: PathBuf,
     /// Folder of the models, their index and atlas, and the contact model, whose layers feel traction.
     pub models: PathBuf,

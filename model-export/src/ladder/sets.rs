@@ -112,7 +112,7 @@ const REFERENCE: Source = Source {
     part: Part::All,
 };
 
-const SOURCES: [Source; 6] = [
+const SOURCES: [Source; 7] = [
     Source {
         name: "heldout-presses",
         folder: "broad-graded",
@@ -130,6 +130,13 @@ const SOURCES: [Source; 6] = [
         name: "reference-anew",
         folder: "final-anew",
         about: "the same shapes on the finest mesh in other poses, solved when everything was decided",
+        part: Part::All,
+    },
+    Source {
+        name: "reference-shapes",
+        folder: "final-shapes",
+        about: "twelve shapes that no other set has, on the finest mesh, solved when everything was \
+                decided",
         part: Part::All,
     },
     Source {

@@ -18,11 +18,12 @@ pub const POSES_SET: &str = "poses";
 
 /// Names of the held-out sets. For clients that give pressure, tiers are compared on the first of
 /// them on which all were measured; for clients that give poses or gaps, on [`POSES_SET`].
-pub const SET_NAMES: [&str; 7] = [
+pub const SET_NAMES: [&str; 8] = [
     "heldout-presses",
     "heldout-shapes",
     REFERENCE_SET,
     "reference-anew",
+    "reference-shapes",
     "pressed",
     "s1",
     POSES_SET,
