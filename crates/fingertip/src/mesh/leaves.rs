@@ -9,7 +9,7 @@
 use super::half_cube::{GridSize, SIDES};
 use crate::geometry::fingertip::{FingertipShape, SurfaceParameter};
 use papilla_solid::tensor::norm;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// Times that a cell can be halved along each of its sides.
 const HALVINGS_MAX: u32 = 6;
@@ -75,6 +75,35 @@ impl Leaves {
         out
     }
 
+    /// The same cells, but `cells` (by number) halved along the longer of their sides, and
+    /// neighbours as far as these want it; `None` if one of them is as small as cells can be.
+    pub(super) fn halved(&self, shape: &FingertipShape, cells: &BTreeSet<usize>) -> Option<Self> {
+        let mut out = Self { leaves: Vec::with_capacity(self.leaves.len()), ..self.clone() };
+        for (n, &leaf) in self.leaves.iter().enumerate() {
+            if !cells.contains(&n) {
+                out.leaves.push(leaf);
+                continue;
+            }
+            let length = self.sides_mm(leaf, shape).1.map(norm);
+            let k = usize::from(length[1] > length[0]);
+            if leaf.size[k] <= 2 {
+                return None;
+            }
+            out.leaves.extend(leaf.halves(k));
+        }
+        out.balance();
+        out.leaves.sort_unstable();
+        Some(out)
+    }
+
+    /// Nodes of a cell, mm, and the ways across its middle along its rows and its columns.
+    fn sides_mm(&self, leaf: Leaf, shape: &FingertipShape) -> ([[f64; 3]; 9], [[f64; 3]; 2]) {
+        let at = leaf.nodes(self.size).map(|a| shape.skin(self.parameter(a)));
+        let along = [[at[1], at[7]], [at[3], at[5]]]
+            .map(|[a, b]| -> [f64; 3] { std::array::from_fn(|i| b[i] - a[i]) });
+        (at, along)
+    }
+
     /// Parameter of an address of the finest lattice.
     pub(super) fn parameter(&self, at: Address) -> SurfaceParameter {
         self.size.parameter(at, &self.body)
@@ -114,10 +143,7 @@ impl Leaves {
         shape: &FingertipShape,
         wanted: Wanted<'_>,
     ) -> Option<usize> {
-        let nodes = leaf.nodes(self.size);
-        let at = nodes.map(|a| shape.skin(self.parameter(a)));
-        let along = [[at[1], at[7]], [at[3], at[5]]]
-            .map(|[a, b]| -> [f64; 3] { std::array::from_fn(|i| b[i] - a[i]) });
+        let (at, along) = self.sides_mm(leaf, shape);
         let length = along.map(norm);
         // The longest first, so that cells do not become needles on the way.
         let order = if length[0] >= length[1] { [0, 1] } else { [1, 0] };

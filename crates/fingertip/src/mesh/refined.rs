@@ -7,7 +7,7 @@ use super::patch::{PATCH_SIDE_QUARTERS, Patch, Vertices, patch_of};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use papilla_fem::element::shape::{hat_1d, quadratic_1d};
 use papilla_fem::mesh::{HangingNode, Mesh};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The lattice whose cells are split.
 pub(super) const BASE: GridSize = GridSize { across: 8, side: 4, cap: 4, body: 6 };
@@ -38,6 +38,16 @@ impl Refined {
             _ => f64::INFINITY,
         };
         let leaves = Leaves::new(BASE, shape, &wanted);
+        Self::of(leaves, spacing)
+    }
+
+    /// The same grid with `cells` halved, see [`Leaves::halved`].
+    pub(super) fn halved(&self, shape: &FingertipShape, cells: &BTreeSet<usize>) -> Option<Self> {
+        Some(Self::of(self.leaves.halved(shape, cells)?, self.spacing.clone()))
+    }
+
+    /// Nodes of the cells, and which of them hang.
+    fn of(leaves: Leaves, spacing: Option<Spacing>) -> Self {
         let size = leaves.size;
         let mut map = BTreeMap::new();
         let cells = leaves

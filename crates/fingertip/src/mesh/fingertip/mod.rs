@@ -9,6 +9,7 @@
 
 mod blame;
 mod soundness;
+mod unfolded;
 
 use super::extrude::Cells;
 use super::grading::{Closeness, Contact, Spacing};
@@ -201,11 +202,17 @@ pub fn build(
     contact: Option<&Contact>,
 ) -> Result<FingertipMesh, FingertipShapeError> {
     shape.validate()?;
-    let refined = (order == Order::Graded).then(|| {
-        let spacing = contact.map(|c| Spacing::new(shape, c, density.closeness()));
-        Refined::new(shape, spacing)
-    });
-    layered(shape, &density.resolution(order), order, parts, refined)
+    let resolution = density.resolution(order);
+    if order != Order::Graded {
+        return layered(shape, &resolution, order, parts, None);
+    }
+    match contact {
+        None => layered(shape, &resolution, order, parts, Some(Refined::new(shape, None))),
+        Some(contact) => {
+            let spacing = Spacing::new(shape, contact, density.closeness());
+            unfolded::layered(shape, &resolution, parts, Refined::new(shape, Some(spacing)))
+        }
+    }
 }
 
 /// Meshes a fingertip in [`Order::Graded`] for a given pressure: `pressed` says of a point of the skin
@@ -221,8 +228,8 @@ pub fn build_pressed(
 ) -> Result<FingertipMesh, FingertipShapeError> {
     shape.validate()?;
     let spacing = Spacing::of_pressure(shape, pressed, density.closeness());
-    let refined = Some(Refined::new(shape, Some(spacing)));
-    layered(shape, &density.resolution(Order::Graded), Order::Graded, parts, refined)
+    let refined = Refined::new(shape, Some(spacing));
+    unfolded::layered(shape, &density.resolution(Order::Graded), parts, refined)
 }
 
 /// The mesh `fine`, of [`build`] in [`Order::Graded`], with cells as large as those of
@@ -241,10 +248,9 @@ pub fn build_guide(
     let Some(to) = fine.refined.as_ref().filter(|_| leads) else { return Ok(None) };
     let Some(spacing) = &to.spacing else { return Ok(None) };
     let guide = Refined::new(shape, Some(spacing.with(Density::Coarse.closeness())));
-    let transfer = Transfer::new(&guide, to);
-    let resolution = density.resolution(Order::Graded);
-    let mesh = layered(shape, &resolution, Order::Graded, parts, Some(guide))?;
-    Ok(Some((mesh, transfer)))
+    let mesh = unfolded::layered(shape, &density.resolution(Order::Graded), parts, guide)?;
+    let transfer = mesh.refined.as_ref().map(|guide| Transfer::new(guide, to));
+    Ok(transfer.map(|transfer| (mesh, transfer)))
 }
 
 /// Extrudes the skin's grid through the layers.
