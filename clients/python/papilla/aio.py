@@ -20,7 +20,7 @@ from .address import Address, clean_token
 from .answer import Answer, Problem
 from .errors import Closed, Refused, Unreachable
 from .http import DEFAULT_URL, refusal
-from .link import Frame, Warned, dial, questions, told_beyond, told_refused
+from .link import Frame, StaysError, Warned, dial, questions, told_beyond, told_refused, told_stays
 from .wire import NetForce, Window
 
 _PATIENCE_S: Final = 30.0
@@ -77,6 +77,8 @@ class AsyncSession:
         self._reading: asyncio.Task[None] | None = None
         self._following: asyncio.Task[None] | None = None
         self._sealed: asyncio.Future[bytes] | None = None
+        self._seals_due = 0
+        """Sealed states that were asked for and have not come: a late one is not that of the last move."""
         self._closed = False
         self._fault: Refused | None = None
 
@@ -299,6 +301,7 @@ class AsyncSession:
 
     async def _begin(self, socket: ClientConnection, ready: dict[str, Any]) -> None:
         self._socket = socket
+        self._seals_due = 0
         await self._agree(ready)
         self.connections += 1
 
@@ -306,7 +309,8 @@ class AsyncSession:
         """Goes on over another connection, with what the service remembers.
 
         Frames go on over the old one until the new one is there; then they wait for what was sent to
-        be answered, and for ready.
+        be answered, and for ready. If the service does not say what it remembers, the session stays
+        until it is asked again.
         """
         while True:
             new = None
@@ -316,12 +320,16 @@ class AsyncSession:
                     old = self._socket
                     assert old is not None
                     sealed = await self._seal(old)
-                    resume = {} if sealed is None else {"resume": True}
-                    saying = self._say(new, {**self._hello, **resume}, sealed)
+                    saying = self._say(new, {**self._hello, "resume": True}, sealed)
                     ready = await asyncio.wait_for(saying, _MOVE_PATIENCE_S)
-                    # Nothing, unless the service did not say what it remembers.
-                    self._lose_sent()
                     await self._begin(new, ready)
+            except StaysError as why:
+                self._following = None
+                words = told_stays(str(why))
+                self._warned.once(words, words)
+                if new is not None:
+                    await new.close()
+                return
             except (OSError, WebSocketException, Unreachable, Refused):
                 # The old connection goes on for as long as it is there.
                 if new is not None:
@@ -334,16 +342,23 @@ class AsyncSession:
             await old.close()
             return
 
-    async def _seal(self, socket: ClientConnection) -> bytes | None:
-        """What the service remembers, once it has answered what was sent; None: it does not say."""
+    async def _seal(self, socket: ClientConnection) -> bytes:
+        """What the service remembers, once it has answered what was sent; StaysError: it does not say."""
         self._sealed = asyncio.get_running_loop().create_future()
+        self._seals_due += 1
         try:
             await socket.send(json.dumps({"type": "seal"}))
             return await asyncio.wait_for(self._sealed, _MOVE_PATIENCE_S)
         except TimeoutError:
-            return None
+            raise StaysError(f"nothing came within {_MOVE_PATIENCE_S:g} s") from None
         finally:
             self._sealed = None
+
+    def _seal_came(self) -> asyncio.Future[bytes] | None:
+        """Who waits for what came as a sealed state, or in place of one; None: nobody any more."""
+        self._seals_due = max(0, self._seals_due - 1)
+        is_awaited = self._seals_due == 0 and self._sealed is not None and not self._sealed.done()
+        return self._sealed if is_awaited else None
 
     async def _agree(self, ready: dict[str, Any]) -> None:
         self.ready = ready
@@ -427,8 +442,9 @@ class AsyncSession:
 
     def _answered(self, message: bytes) -> None:
         if message.startswith(wire.SEALED):
-            if self._sealed is not None and not self._sealed.done():
-                self._sealed.set_result(message)
+            sealed = self._seal_came()
+            if sealed is not None:
+                sealed.set_result(message)
             return
         header = wire.decode(message)
         frame = self._sent.pop(header.sequence, None)
@@ -443,17 +459,25 @@ class AsyncSession:
             if self._following is None:
                 self._following = asyncio.create_task(self._follow())
             return
-        frame = self._sent.pop(message.get("sequence", -1), None)
+        sequence: int | None = message.get("sequence")
+        frame = None if sequence is None else self._sent.pop(sequence, None)
         if frame is not None:
             problem = Problem(message["code"], message["message"], message.get("field"))
             self._warned.once(problem.code, told_refused(problem))
             frame.end("error", problem=problem)
+        elif sequence is not None:
+            # Of a frame whose time is over.
+            return
         elif self._renewal is not None and not self._renewal.done():
             if message["type"] == "ready":
                 self._renewal.set_result(message)
             else:
                 refused = Refused(message["code"], message["message"], message.get("field"))
                 self._renewal.set_exception(refused)
+        elif self._seals_due > 0 and message["type"] == "error":
+            sealed = self._seal_came()
+            if sealed is not None:
+                sealed.set_exception(StaysError(message["message"]))
 
     async def _write(self) -> None:
         """Sends what waits, one frame at a time."""

@@ -350,6 +350,14 @@ class Run:
             time.sleep(0.005)
         self.moved = session.connections
 
+    def stay(self, step: Step) -> None:
+        """It was asked to move and could not, and says why."""
+        session, begin = self.open_session(), time.monotonic()
+        while not any(step["says"] in words for words in session.warnings):
+            must(time.monotonic() < begin + step["within_s"], f"it does not say {step['says']}: {session.warnings}")
+            time.sleep(0.005)
+        must(session.connections == self.moved, "it has moved")
+
     def http(self, step: Step) -> None:
         expect = step["expect"]
         try:

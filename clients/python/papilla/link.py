@@ -15,6 +15,10 @@ _SOCKET_BYTES: Final = 512 * 1024
 _LOG: Final = logging.getLogger("papilla")
 
 
+class StaysError(Exception):
+    """The service asked the session to move, and does not say what it remembers; the text says why."""
+
+
 class Frame:
     """A frame on its way, and who waits for its outcome."""
 
@@ -80,6 +84,14 @@ def questions(ready: dict[str, Any]) -> list[str]:
         meant = f"; it counts microseconds: were {budget_us} ms meant?" if budget_us < 100 else ""
         asked.append(f"{needs}, and budget_us is {budget_us}, so that frames may be late{meant}")
     return asked
+
+
+def told_stays(why: str) -> str:
+    """Said of a move that the service did not make possible."""
+    return (
+        f"the service asked the session to move, and did not say what it remembers ({why}): "
+        "it goes on over its old connection, and starts anew when that ends"
+    )
 
 
 def told_beyond(tier: str) -> str:

@@ -99,7 +99,10 @@ export class Hand {
       binary: (data) => this.#binary(data),
       lost: (why) => { this.#why = why; this.#lost(); },
     });
-    this.#move = new Move(this.#link, (resume) => this.#greet(resume), () => this.#flush());
+    this.#move = new Move(this.#link, () => this.#greet(true), (why) => {
+      if (why) this.#warnings.stays(why);
+      this.#flush();
+    });
   }
 
   /**
@@ -286,8 +289,9 @@ export class Hand {
     if (sent) {
       this.#warnings.tell('error', () => `a frame was refused: ${message.message}`);
       sent.reject(new PapillaError(message));
+    } else if (typeof message.sequence === 'number' || !this.ready || message.closes || !this.#move.refuses(message)) {
+      this.onrefused(message);
     }
-    else this.onrefused(message);
   }
 
   /** @param {number} sequence */

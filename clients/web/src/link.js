@@ -100,6 +100,13 @@ export class Link {
     };
   }
 
+  /** Gives the other connection up: this one goes on until `prepare` is called again. */
+  stay() {
+    clearTimeout(this.#retry);
+    if (this.#next) end(this.#next);
+    this.#next = null;
+  }
+
   /** Goes on over that connection, and closes this one; false: it is not there any more. */
   move() {
     const [old, next] = [this.#socket, this.#next];

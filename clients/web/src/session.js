@@ -66,6 +66,8 @@ export class Session {
   /** @type {ReturnType<Answer['views']> | null} */ #viewsBefore = null;
   /** @type {Map<number, {resolve: (answer: Answer) => void, reject: (error: Error) => void}>} */ #promised = new Map();
   #opened = false;
+  // New terms that wait for the session to have moved, or to stay.
+  #unsaid = false;
   #warnings = new Warnings();
 
   /**
@@ -82,7 +84,7 @@ export class Session {
       binary: (data) => this.#binary(data),
       lost: (why) => this.#lost(why),
     });
-    this.#move = new Move(this.#link, (resume) => this.#moved(resume), () => this.#flush());
+    this.#move = new Move(this.#link, () => this.#moved(), (why) => this.#goOn(why));
     this.#watch = new Watch(options.timeoutMs ?? TIMEOUT_MS, (bornMs) => this.#expire(bornMs));
     this.#outbox = new Outbox(() => this.#flush(), (sequence, status) => this.#settle(sequence, status, null), this.#watch);
     this.#hello = { ...DEFAULTS, ...hello };
@@ -166,7 +168,8 @@ export class Session {
     this.#termsFrom = (this.#outbox.sequence + 1) >>> 0;
     this.ready = null;
     // A session that moves says it where it goes on.
-    if (this.#move.holds) return;
+    this.#unsaid = this.#move.holds;
+    if (this.#unsaid) return;
     if (this.#link.isOpen) this.#greet(false);
     else if (this.#opened && !this.#link.isBusy) this.#link.connect();
   }
@@ -271,16 +274,24 @@ export class Session {
 
   /** @param {boolean} resume */
   #greet(resume) {
+    this.#unsaid = false;
     const state = resume ? { resume } : {};
     this.#link.send(JSON.stringify({ ...this.#hello, ...state, type: 'hello', version: VERSION, reconnect: true }));
   }
 
-  /** The session goes on over another connection; what went out was answered. @param {boolean} resume */
-  #moved(resume) {
+  /** The session goes on over another connection; what went out was answered. */
+  #moved() {
     this.ready = null;
     this.#before = null;
     this.#outbox.lose(false);
-    this.#greet(resume);
+    this.#greet(true);
+  }
+
+  /** The session that was to move goes on over its old connection. @param {string} why it stays there, '' if it tries again */
+  #goOn(why) {
+    if (why) this.#warnings.stays(why);
+    if (this.#unsaid) this.#greet(false);
+    this.#flush();
   }
 
   /** @param {string} why */
@@ -339,6 +350,8 @@ export class Session {
       if (this.#outbox.take(sequence)) this.#settle(sequence, 'error', problem);
       return;
     }
+    // The service answers in turn: a hello that was said comes before a state.
+    if ((this.ready || this.#unsaid) && !problem.closes && this.#move.refuses(problem)) return;
     if (!this.ready && !problem.closes && !PASSING.has(problem.code)) this.#refused(problem);
     this.onrefused(problem);
   }

@@ -43,6 +43,12 @@ export class Warnings {
     console.warn(`papilla: ${words()}`);
   }
 
+  /** Why a session that was asked to move stays. @param {string} why */
+  stays(why) {
+    const words = `the service asked the session to move, and did not say what it remembers (${why}): it goes on over its old connection, and starts anew when that ends`;
+    this.tell(words, () => words);
+  }
+
   /** What the service asks, and a budget that it cannot meet. @param {import('./types.js').Ready} ready */
   question(ready) {
     for (const { member, question } of ready.warnings ?? []) {

@@ -307,6 +307,13 @@ class Runner {
     this.moved = session.ready?.session;
   }
 
+  /** It was asked to move and could not, and says why. @param {Step} step */
+  async stay({ says, within_s: withinS }) {
+    const session = /** @type {Session} */ (this.session);
+    await this.until(`the warning '${says}'`, () => session.warnings.some((words) => words.includes(says)), withinS * 1000);
+    same('session', session.ready?.session, this.moved);
+  }
+
   /** @param {Step} step */
   async http({ pressure, tier, expect }) {
     let outcome;

@@ -1,4 +1,4 @@
-// `npm run build`: the scene, and the client alone as one module, in dist/.
+// `npm run build`: the scene, the client alone as one module, and its reader of meshes with three.js for the service's page, in dist/.
 
 import { copyFile, mkdir } from 'node:fs/promises';
 import { fileURLToPath } from 'node:url';
@@ -8,7 +8,7 @@ const here = (/** @type {string} */ path) => fileURLToPath(new URL(path, import.
 
 await mkdir(here('../dist'), { recursive: true });
 await build({
-  entryPoints: { scene: here('scene.js'), papilla: here('../papilla.js') },
+  entryPoints: { scene: here('scene.js'), papilla: here('../papilla.js'), meshes: here('../src/meshes.js') },
   outdir: here('../dist'),
   bundle: true,
   minify: true,

@@ -177,7 +177,8 @@ impl Session {
     }
 
     /// What people were told on standard error so far, each thing once: the first refused frame, the
-    /// first one out of range, the first timeout, a budget that the service cannot meet.
+    /// first one out of range, the first timeout, a budget that the service cannot meet, a move that
+    /// it asked for and did not make possible.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         self.shared.state().told.words.clone()

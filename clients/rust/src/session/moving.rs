@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{Address, PapillaError};
 
-/// Longest wait for what the service remembers; after it the session starts anew.
+/// Longest wait for what the service remembers; after it the session stays.
 const SEAL_PATIENCE: Duration = Duration::from_secs(5);
 
 /// Longest wait for the other connection, and for its ready.
@@ -21,7 +21,7 @@ const CONNECT_PATIENCE: Duration = Duration::from_secs(5);
 impl Shared {
     /// Calls [`follow`] where there is something for it to do.
     pub(super) fn tell_of_move(&self) {
-        if matches!(self.state().moving, Moving::Asked | Moving::Sealed(_)) {
+        if matches!(self.state().moving, Moving::Asked | Moving::Sealed(_) | Moving::Refused(_)) {
             self.moving.notify_one();
         }
     }
@@ -29,38 +29,52 @@ impl Shared {
 
 /// Waits until the service asks for it, and opens the session anew over another connection, with
 /// what the service remembers. Frames go on over the old one until the new one is there; then they
-/// wait for what was sent to be answered, and for ready.
+/// wait for what was sent to be answered, and for ready. If the service does not say what it
+/// remembers, the session stays until it is asked again.
 pub(super) async fn follow(server: &Address, shared: &Shared) -> (Link, Ready) {
     loop {
         while shared.state().moving != Moving::Asked {
             shared.moving.notified().await;
         }
-        if let Ok(moved) = attempt(server, shared).await {
-            return moved;
+        match attempt(server, shared).await {
+            Ok(Some(moved)) => return moved,
+            Ok(None) => shared.wake.notify_one(),
+            Err(_) => {
+                // The old connection goes on for as long as it is there.
+                shared.state().moving = Moving::Asked;
+                shared.wake.notify_one();
+                sleep(RETRY).await;
+            }
         }
-        // The old connection goes on for as long as it is there.
-        shared.state().moving = Moving::Asked;
-        shared.wake.notify_one();
-        sleep(RETRY).await;
     }
 }
 
-async fn attempt(server: &Address, shared: &Shared) -> Result<(Link, Ready), PapillaError> {
+/// None: the session stays.
+async fn attempt(server: &Address, shared: &Shared) -> Result<Option<(Link, Ready)>, PapillaError> {
     let silent = |_| PapillaError::unreachable(server, &"no ready came");
     let link = timeout(CONNECT_PATIENCE, Link::connect(server)).await.map_err(silent)??;
     shared.state().moving = Moving::SealDue;
     shared.wake.notify_one();
-    // Err: the session starts anew.
-    let sealed = timeout(SEAL_PATIENCE, sealed(shared)).await.ok();
-    let resume = sealed.as_ref().map(|_| true);
-    let hello = Hello { resume, ..shared.state().hello.clone() };
-    timeout(CONNECT_PATIENCE, link.say(server, &hello, sealed)).await.map_err(silent)?
+    let late = |_| Err(format!("nothing came within {} s", SEAL_PATIENCE.as_secs()));
+    let sealed = match timeout(SEAL_PATIENCE, sealed(shared)).await.unwrap_or_else(late) {
+        Ok(sealed) => sealed,
+        Err(why) => {
+            shared.state().stay(&why);
+            return Ok(None);
+        }
+    };
+    let hello = Hello { resume: Some(true), ..shared.state().hello.clone() };
+    let saying = link.say(server, &hello, Some(sealed));
+    timeout(CONNECT_PATIENCE, saying).await.map_err(silent)?.map(Some)
 }
 
-async fn sealed(shared: &Shared) -> Vec<u8> {
+/// What the service remembers; or why it does not say it.
+async fn sealed(shared: &Shared) -> Result<Vec<u8>, String> {
     loop {
-        if let Moving::Sealed(state) = &mut shared.state().moving {
-            return std::mem::take(state);
+        match &mut shared.state().moving {
+            Moving::Sealed(state) => return Ok(std::mem::take(state)),
+            Moving::Refused(why) => return Err(std::mem::take(why)),
+            Moving::Stays | Moving::Asked | Moving::SealDue | Moving::SealSaid => {}
         }
         shared.moving.notified().await;
     }

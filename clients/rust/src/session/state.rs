@@ -60,6 +60,8 @@ pub(super) enum Moving {
     SealSaid,
     /// It is here.
     Sealed(Vec<u8>),
+    /// The service does not say it, for this reason.
+    Refused(String),
 }
 
 /// What the writer is to send.
@@ -83,6 +85,8 @@ pub(super) struct State {
     pub(super) ready: Arc<Ready>,
     pub(super) asked: Option<Asked>,
     pub(super) moving: Moving,
+    /// States that were asked for and have not come: a late one is not that of the last move.
+    seals_due: u32,
     pub(super) superseded_by_client: u64,
     tiers: HashMap<u16, String>,
     sequence: u32,
@@ -104,6 +108,7 @@ impl State {
             ready: Arc::new(ready),
             asked: None,
             moving: Moving::Stays,
+            seals_due: 0,
             superseded_by_client: 0,
             tiers: HashMap::new(),
             sequence: 0,
@@ -203,6 +208,7 @@ impl State {
         }
         if self.moving == Moving::SealDue {
             self.moving = Moving::SealSaid;
+            self.seals_due += 1;
             return Some(Next::Seal);
         }
         if self.waiting.is_empty() {
@@ -218,9 +224,7 @@ impl State {
     /// Takes a binary message.
     pub(super) fn on_binary(&mut self, message: &[u8]) -> Result<(), PapillaError> {
         if message.starts_with(&SEALED_MAGIC) {
-            if self.moving == Moving::SealSaid {
-                self.moving = Moving::Sealed(message.to_vec());
-            }
+            self.seal_came(Moving::Sealed(message.to_vec()));
             return Ok(());
         }
         let header = FrameHeader::decode(message)?;
@@ -236,6 +240,24 @@ impl State {
         // Err: nobody waits for it any more.
         let _ = pending.outcome.send(answer);
         Ok(())
+    }
+
+    /// A sealed state came, or a refusal in place of one.
+    fn seal_came(&mut self, as_what: Moving) {
+        self.seals_due = self.seals_due.saturating_sub(1);
+        if self.seals_due == 0 && self.moving == Moving::SealSaid {
+            self.moving = as_what;
+        }
+    }
+
+    /// The service did not say what it remembers: the session stays until it is asked again.
+    pub(super) fn stay(&mut self, why: &str) {
+        self.moving = Moving::Stays;
+        let words = format!(
+            "the service asked the session to move, and did not say what it remembers ({why}): it \
+             goes on over its old connection, and starts anew when that ends"
+        );
+        self.told.once(&words, || words.clone());
     }
 
     /// Takes a text message.
@@ -254,16 +276,13 @@ impl State {
             }
             ServerMessage::Error(SessionError { code, message, field, sequence, .. }) => {
                 let problem = Problem { code, message, field };
-                match sequence.and_then(|sequence| self.forget(sequence)) {
-                    Some(pending) => {
-                        // Whoever looks at maps alone would not see it.
-                        let words = || format!("a frame was refused: {}", problem.message);
-                        self.told.once("error", words);
-                        pending.end(Status::Error(problem));
-                    }
+                match sequence {
+                    Some(sequence) => self.refuse(sequence, problem),
                     None => {
                         if let Some(asked) = self.asked.take_if(|asked| asked.said) {
                             let _ = asked.reply.send(Err(PapillaError::Refused(problem)));
+                        } else if self.seals_due > 0 {
+                            self.seal_came(Moving::Refused(problem.message));
                         }
                     }
                 }
@@ -272,10 +291,19 @@ impl State {
         }
     }
 
+    /// A frame is refused; of one whose time is over nobody wants to know.
+    fn refuse(&mut self, sequence: u32, problem: Problem) {
+        let Some(pending) = self.forget(sequence) else { return };
+        // Whoever looks at maps alone would not see it.
+        self.told.once("error", || format!("a frame was refused: {}", problem.message));
+        pending.end(Status::Error(problem));
+    }
+
     /// The connection broke: what was sent is lost, what waits goes on waiting.
     pub(super) fn lose(&mut self) {
         self.sent.drain(..).for_each(|pending| pending.end(Status::Lost));
         self.moving = Moving::Stays;
+        self.seals_due = 0;
         self.is_stalled = false;
         if let Some(asked) = self.asked.take_if(|asked| asked.said) {
             let reason = "the connection broke".to_owned();
@@ -283,11 +311,10 @@ impl State {
         }
     }
 
-    /// The session goes on over another connection. Every frame that had left was answered, unless
-    /// the service did not say what it remembers.
+    /// The session goes on over another connection. Every frame that had left was answered.
     pub(super) fn moved(&mut self, ready: Arc<Ready>) {
-        self.sent.drain(..).for_each(|pending| pending.end(Status::Lost));
         self.moving = Moving::Stays;
+        self.seals_due = 0;
         self.agree(ready);
     }
 

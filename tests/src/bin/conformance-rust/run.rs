@@ -73,6 +73,7 @@ impl Run {
             "burst" => self.burst(step).await,
             "reconnect" => self.reconnect(step).await,
             "move" => self.moved(step).await,
+            "stay" => self.stayed(step).await,
             "http" => self.post(step).await,
             "rasterise" => self.rasterise(step).await,
             "contacts" => self.contacts(step).await,
@@ -276,6 +277,20 @@ impl Run {
         let before = self.moved;
         let moved = opened.wait_for(|opened| *opened > before);
         self.moved = *time::timeout(within, moved).await??;
+        Ok(())
+    }
+
+    /// It was asked to move and could not, and says why.
+    async fn stayed(&self, step: &Value) -> Result<()> {
+        let (session, says) = (self.session()?, member::<String>(step, "says")?);
+        let within = Duration::from_secs_f64(member(step, "within_s")?);
+        let told = async {
+            while self.told(&says).is_err() {
+                time::sleep(Duration::from_millis(5)).await;
+            }
+        };
+        time::timeout(within, told).await.with_context(|| format!("it does not say {says}"))?;
+        ensure!(*session.connections().borrow() == self.moved, "it has moved");
         Ok(())
     }
 
