@@ -7,4 +7,4 @@
 
 /// Units of a frame, and of all frames that are tried for a net force: more than any takes that
 /// settles among some thousand random poses, which `docs/concepts/contact.md` tells of.
-pub(crate) const UNITS_MAX: u64 = 1_400_000_000;
+pub const WORK_MAX: u64 = 1_400_000_000;

@@ -64,6 +64,7 @@ mod springs;
 const PA_PER_MPA: f64 = 1e6;
 
 pub use answer::{Contact, Effort, Person, Quality};
+pub use budget::WORK_MAX;
 pub use displacement::Displacement;
 pub use error::{ContactError, ModelError};
 pub use finger_file::{FingerFileError, finger_file_sha256};

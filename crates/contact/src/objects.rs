@@ -107,7 +107,7 @@ impl<'a> View<'a> {
     /// Of things in their places.
     pub(crate) fn of(things: Things<'a>, length: f64) -> Self {
         let cost = cost(things);
-        let work_max = budget::UNITS_MAX;
+        let work_max = budget::WORK_MAX;
         Self { things, length, shift_mm: [0.0; 3], held: &[], back_mm: 0.0, cost, work_max }
     }
 

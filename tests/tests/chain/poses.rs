@@ -6,7 +6,7 @@ mod thrown;
 
 use std::sync::Arc;
 
-use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Settings, Solver};
+use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Settings, Solver, WORK_MAX};
 use papilla_proto::{
     atlas::{Atlas, MAP_SIDE_PX, Patch, Raster},
     sdf::{Placement, RoundedPlate},
@@ -20,9 +20,6 @@ use thrown::{DEPTH_MM, Pad, shapes};
 const CLEAR_MM: f64 = 0.05;
 /// Linearisations at vertices, 16 steps of 3 and 25, twice if a frame starts anew; rounds on pixels.
 const ITERATIONS_MAX: u32 = 2 * (16 * 3 + 25 + 12);
-
-/// The budget of a frame, in units of work.
-const WORK_MAX: u64 = 1_400_000_000;
 
 /// No missed contact, no pressure in air, no tension, bounded work, whatever comes.
 fn throw_at(poses: usize, spacing: PixelSpacing) {

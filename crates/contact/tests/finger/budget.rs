@@ -3,13 +3,10 @@
 use crate::support::{Finger, Throw, atlas};
 use papilla_atlas::{Patch, Raster};
 use papilla_contact::{
-    Contact, NetForce, Object, PixelContact, PixelSkin, PixelSpacing, Settings, Solver,
+    Contact, NetForce, Object, PixelContact, PixelSkin, PixelSpacing, Settings, Solver, WORK_MAX,
 };
 use papilla_sdf::{AnyOf, Placed, Placement, SignedDistance, Sphere};
 use std::sync::Arc;
-
-/// Units of work, as in `docs/concepts/contact.md`.
-const BUDGET: u64 = 1_400_000_000;
 
 fn skin(finger: &Finger) -> Arc<PixelSkin> {
     let atlas = atlas();
@@ -51,8 +48,8 @@ fn a_frame_of_costly_shapes_on_pixels_keeps_its_budget() {
         let (mut solver, mut pixels, mut out) = pressed(&finger, &skin);
         solver.solve_on_pixels(&objects, &mut pixels, &mut out).expect("an answer");
         // What it is in when the budget is used is ended.
-        assert!(out.effort.work >= BUDGET, "never at its budget: {:?}", out.effort);
-        assert!(out.effort.work < 2 * BUDGET, "{:?}", out.effort);
+        assert!(out.effort.work >= WORK_MAX, "never at its budget: {:?}", out.effort);
+        assert!(out.effort.work < 2 * WORK_MAX, "{:?}", out.effort);
         assert!(!out.quality.settled, "{:?}", out.quality);
         assert!(pixels.map_pa().iter().all(|p| p.is_finite() && *p >= 0.0));
         (out, pixels.map_pa().to_vec())
@@ -108,8 +105,8 @@ fn a_search_for_a_net_force_has_one_budget() {
         let net = NetForce { direction: [0.0, 0.0, 1.0], force_n };
         let found = solver.solve_for_force_on_pixels(&objects, net, &mut pixels, &mut out);
         let told = format!("{force_n} N: {found:?} {:?} {:?}", out.effort, out.quality);
-        assert!(out.effort.work < 2 * BUDGET, "{told}");
+        assert!(out.effort.work < 2 * WORK_MAX, "{told}");
         // What it has by then is told, and that it is not the force that was wanted.
-        assert!(out.effort.work < BUDGET || (found.is_ok() && !out.quality.settled), "{told}");
+        assert!(out.effort.work < WORK_MAX || (found.is_ok() && !out.quality.settled), "{told}");
     }
 }
