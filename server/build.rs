@@ -14,10 +14,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
     let out = PathBuf::from(env::var("OUT_DIR")?);
     embed(files(&root.join("../models"), &["onnx", "json", "contact"])?, &out.join("models.rs"))?;
-    let endings = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp"];
+    let endings = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp", "txt"];
     let mut page = files(&root.join("web"), &endings)?;
-    // The web client's: the page has its connection, its atlas and its pixels.
-    page.extend(files(&root.join("../clients/web/src"), &["js"])?);
+    // The web client's: the page has its connection, its atlas and its pixels. What needs three.js
+    // is in web/ in its place, bundled with it.
+    let own = page.clone();
+    let is_bundled = |path: &PathBuf| own.iter().any(|file| file.file_name() == path.file_name());
+    let client = files(&root.join("../clients/web/src"), &["js"])?;
+    page.extend(client.into_iter().filter(|path| !is_bundled(path)));
     embed(page, &out.join("page.rs"))?;
     embed(files(&root.join("web/xr"), &["html", "js", "txt"])?, &out.join("scene.rs"))?;
     Ok(())

@@ -41,6 +41,8 @@ export class PressControl {
     this.sizes = Object.fromEntries(Object.entries(SHAPES).map(([name, { size }]) => [name, size?.[3] ?? 0]));
     /** The visitor's own mesh, if one was dropped. */
     this.mesh = undefined;
+    /** What pressed before that mesh, until the service has taken the mesh; null: it has. */
+    this.before = null;
     this.slidS = 0;
     this.#listShapes();
     this.#listenToForm();
@@ -135,9 +137,21 @@ export class PressControl {
 
   /** Presses with the visitor's own mesh from now on. */
   takeMesh(mesh, sizeMm) {
+    this.before ??= { shape: this.shape, mesh: this.mesh, sizeMm: this.sizes.mesh };
+    this.#pressWith('mesh', mesh, sizeMm);
+  }
+
+  /** Presses again with what pressed before a mesh that the service refuses. */
+  takeBack() {
+    const { shape, mesh, sizeMm } = this.before;
+    this.before = null;
+    this.#pressWith(shape, mesh, sizeMm);
+  }
+
+  #pressWith(shape, mesh, sizeMm) {
     this.mesh = mesh;
     this.sizes.mesh = sizeMm;
-    document.querySelector('input[name=shape][value=mesh]').checked = true;
+    document.querySelector(`input[name=shape][value=${shape}]`).checked = true;
     delete this.inputs.size.dataset.shape;
     this.#reshape();
   }

@@ -1,9 +1,9 @@
 // What comes in and goes out as a file or a text: a mesh of the visitor's own, and what is taken along.
 
-import { meshOf, MM_PER_M } from './mesh.mjs';
 import { byId } from './notice.mjs';
 import { save } from './share.mjs';
 
+const MM_PER_M = 1000;
 const PLAUSIBLE_MM = { least: 3, most: 30 };
 const OTHERWISE_MM = 10;
 
@@ -21,16 +21,42 @@ export function sizeFor(sideMm) {
   return [OTHERWISE_MM, `${sideMm.toPrecision(3)} mm in the file, made ${OTHERWISE_MM} mm`];
 }
 
-/** Takes files that are dropped on the page or opened: `take(mesh, sizeMm)` gets their mesh, `complain` what is wrong with them. */
+/** The mesh in a file as the web client reads it: its vertices in mm about the middle of their box. Throws an Error that says what is wrong with it. */
+export async function meshOf(bytes, name) {
+  // Its readers are those of three.js, which a page without a file does not load.
+  const { readMesh } = await import('./meshes.js');
+  // A unit is said, so that no size is asked about: the page fits it to the finger.
+  const { vertices_mm: found, triangles } = await readMesh(bytes, name, { unit: /\.glb$/i.test(name) ? 'm' : 'mm' });
+  const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  for (const vertex of found) {
+    vertex.forEach((x, axis) => {
+      low[axis] = Math.min(low[axis], x);
+      high[axis] = Math.max(high[axis], x);
+    });
+  }
+  const vertices = found.map((vertex) => vertex.map((x, axis) => x - (low[axis] + high[axis]) / 2));
+  return { name, vertices_mm: vertices, triangles, sideMm: Math.max(...high.map((x, axis) => x - low[axis])) };
+}
+
+/**
+ * Takes files that are dropped on the page or opened: `take(mesh, sizeMm)` gets their mesh, `complain` what is wrong with them.
+ * Returns `note(mesh, questions)`, which says what presses, and what the service asks about it; undefined: no mesh of a file.
+ */
 export function listenToMeshes(take, complain, hasMesh) {
+  const { textContent: invitation } = byId('mesh-note');
+  const note = (mesh, questions = []) => {
+    const asked = questions.map((question) => ` The service asks: ${question}`).join('');
+    byId('mesh-note').textContent = mesh ? `${mesh.words}.${asked} Its side towards +z presses.` : invitation;
+  };
   const read = async (file) => {
     try {
-      const mesh = meshOf(await file.arrayBuffer(), file.name);
+      const mesh = await meshOf(await file.arrayBuffer(), file.name);
       const [size, why] = sizeFor(mesh.sideMm);
-      take(mesh, size);
-      byId('mesh-note').textContent = `${[`${file.name}: ${mesh.given} triangles`, why, ...mesh.said].join('; ')}. Its side towards +z presses.`;
+      const told = { ...mesh, words: `${file.name}: ${mesh.triangles.length} triangles; ${why}` };
+      take(told, size);
+      note(told);
     } catch (error) {
-      complain(error.message);
+      complain(error.problem?.message ?? error.message);
     }
   };
   const end = () => { delete document.body.dataset.dragging; };
@@ -48,6 +74,7 @@ export function listenToMeshes(take, complain, hasMesh) {
   byId('mesh-open').addEventListener('click', () => byId('mesh-file').click());
   // The chip of one's own mesh asks for a file, unless there is one already; whoever walks over the chips by keyboard is not asked.
   document.querySelector('input[name=shape][value=mesh]').addEventListener('click', ({ detail }) => { if (!hasMesh() && detail > 0) byId('mesh-file').click(); });
+  return note;
 }
 
 const say = (text) => { byId('share-note').textContent = text; };

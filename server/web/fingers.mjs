@@ -119,12 +119,13 @@ class Digit {
 }
 
 export class HandView {
-  /** `terms()`: tier and budget of the hello; `press`: whose shape all fingers meet; `told(ready)`, `notify(message)`. */
-  constructor(atlas, press, { terms, told, notify, answered }) {
+  /** `terms()`: tier and budget of the hello; `press`: whose shape all fingers meet; `told(ready)`, `notify(message)`, `refused(message, problem)`. */
+  constructor(atlas, press, { terms, told, notify, refused, answered }) {
     this.press = press;
     this.terms = terms;
     this.told = told;
     this.notify = notify;
+    this.refused = refused;
     this.answered = answered;
     this.scale = new Scale(byId('hand-scale'), { table: 'inferno', unit: 'J/m³', least: 1 });
     this.digits = DIGITS.map((digit, number) => new Digit(digit, number, atlas, this.scale));
@@ -179,7 +180,7 @@ export class HandView {
       this.told(hand.ready);
       for (const digit of this.digits) digit.changed = true;
     } catch (error) {
-      this.notify(error.message);
+      this.refused(error.message, error.problem);
       this.reopen(RETRY_MS);
     }
     this.opening = false;

@@ -32,6 +32,8 @@ const LOW_PX = 0.7 * SIDE_PX;
 const CHANGES_SED = ['shear_energy', 'relaxation'];
 /** What the friction of the switch is, where none was chosen. */
 const FRICTION = 0.5;
+/** What the service asks about as a whole: of a mesh, whether what it mended is what was meant. */
+const SHAPE_MEMBER = 'objects[0].shape';
 /** What a link says where the budget chooses the model; one that says nothing leads to the service's default. */
 const BY_BUDGET = 'by-budget';
 
@@ -49,6 +51,8 @@ class Page {
     this.unsent = true;
     /** Whether the switch of shear has set the friction. */
     this.lentFriction = false;
+    /** What was refused and taken back: it is told until the session that goes on has been there for a while. */
+    this.complaint = '';
     /** Other terms, other legends: the next answer is drawn even if it is the same. */
     this.repaint = true;
     /** Greatest pressure of the training of the tier that runs. */
@@ -75,6 +79,7 @@ class Page {
       terms: () => ({ ...this.#terms(), effects: [], error_estimate: false, ...(byId('method').value && { method: byId('method').value }) }),
       told: (ready) => this.#handReady(ready),
       notify: (message) => notify(message),
+      refused: (message, problem) => this.#complain(message, problem),
       answered: (forceN, sedPeak, serverMs) => {
         forgetNotice();
         this.timeline.add(performance.now(), forceN, sedPeak, NaN, null, serverMs);
@@ -91,18 +96,35 @@ class Page {
       onstate: (state, detail) => this.#state(state, detail),
       onready: (ready) => this.#ready(ready),
       onanswer: (answer, roundTripMs) => this.#answer(answer, roundTripMs),
-      onfault: (code, message) => {
+      onfault: (code, message, problem) => {
         this.meters.fault();
-        notify(code === 'atlas_mismatch' ? `${message} Reload the page to fetch the server's atlas.` : message);
+        this.#complain(code === 'atlas_mismatch' ? `${message} Reload the page to fetch the server's atlas.` : message, problem);
       },
     });
+  }
+
+  /** Tells what is wrong. A visitor's mesh that the service refuses is taken back, and what pressed before goes on. */
+  #complain(message, problem) {
+    const { control, press } = this;
+    const isOfMesh = press.shape === 'mesh' && control.before !== null && problem?.code === 'bad_contact' && problem.field?.startsWith('objects');
+    this.complaint = isOfMesh ? `${control.mesh.name}: ${message}` : '';
+    notify(this.complaint || message);
+    if (!isOfMesh) return;
+    control.takeBack();
+    this.noteMesh(control.mesh);
   }
 
   /** Terms that an effect brought and the server refuses are taken back: the rest goes on. */
   #state(state, detail) {
     showState(state, detail);
     const name = this.effects.last;
-    if (state !== 'refused' || !this.effects.on.has(name)) return;
+    if (state !== 'refused') return;
+    if (this.complaint !== '') {
+      this.#open();
+      return;
+    }
+    if (!this.effects.on.has(name)) return;
+    this.complaint = detail;
     this.effects.set(name, false);
     this.spikes.toggle(this.effects.on.has('spikes'));
     this.#open();
@@ -191,7 +213,7 @@ class Page {
     this.ladder.setReady(ready);
     this.#noteBudget(ready);
     showState('ready', '');
-    notify('');
+    this.#tellTakenBack();
     this.hard.begin();
   }
 
@@ -208,7 +230,19 @@ class Page {
     this.#noteBudget(ready);
     // The second answer is of the same indenter and, but for what is compared, found in the same way.
     if (this.comparison.isOn) this.#chooseOther();
-    notify('');
+    this.#tellTakenBack();
+  }
+
+  /** There is a session again: nothing is wrong any more, but what was taken back for it is still told. */
+  #tellTakenBack() {
+    notify(this.complaint);
+    this.complaint = '';
+    if (this.isAnnounced) this.control.before = null;
+  }
+
+  /** Whether the session is one of the body that presses. */
+  get isAnnounced() {
+    return this.mode === 'hand' ? this.hand.body === this.press.body : this.solves && !this.contact.isOther;
   }
 
   /** Says plainly where the model learnt something else and where the budget cannot be met, and offers what comes nearest. */
@@ -220,7 +254,9 @@ class Page {
     const tier = this.#listed(ready.tier);
     const isOther = tier && !suits(tier, this.given);
     if (isOther) note.append(`${nameOfTier(tier.name)}: ${notLearnt(this.given)}. `);
-    for (const { member, question } of ready.warnings ?? []) if (!isOther || member !== 'tier') note.append(`The service asks: ${question}. `);
+    const [ofShape, others] = [true, false].map((is) => (ready.warnings ?? []).filter(({ member }) => (member === SHAPE_MEMBER) === is));
+    if (this.press.shape === 'mesh' && this.isAnnounced) this.noteMesh(this.control.mesh, ofShape.map(({ question }) => question));
+    for (const { member, question } of others) if (!isOther || member !== 'tier') note.append(`The service asks: ${question}. `);
     if (ready.meets_budget !== false) return;
     const budgetMs = ready.budget_us / 1000;
     const advice = this.#advice(ready.tier, budgetMs);
@@ -462,7 +498,7 @@ class Page {
       this.replay.choose(Number(byId('replay-press').value));
     });
     byId('replay-play').addEventListener('click', () => this.#play(!this.replay.playing));
-    listenToMeshes((mesh, sizeMm) => this.control.takeMesh(mesh, sizeMm), notify, () => this.control.mesh !== undefined);
+    this.noteMesh = listenToMeshes((mesh, sizeMm) => this.control.takeMesh(mesh, sizeMm), notify, () => this.control.mesh !== undefined);
     this.#listenToShare();
   }
 

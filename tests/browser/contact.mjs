@@ -474,14 +474,16 @@ test('an STL or a GLB dropped on the page presses, in mm or in metres, and what 
   assert.match(metres.note, /0\.0120 long in the file: taken as metres, 12 mm\./);
   near(metres, 'in metres');
   const open = await drop(stlOf(dome({ radius: 6, isOpen: true })), 'cup.stl');
-  assert.match(open.note, /360 triangles; its own size; open: 1 hole closed with 24 triangles\./);
+  assert.match(open.note, /360 triangles; its own size\. The service asks: .*; 1 hole was closed; is this the body that is meant\?/);
   near(open, 'its hole closed, which the skin does not meet');
   const glb = await drop(glbOf(dome({ radius: 6, isOpen: true })), 'cup.glb');
-  assert.match(glb.note, /360 triangles; its own size; open: 1 hole closed with 24 triangles\./);
+  assert.match(glb.note, /360 triangles; its own size\. The service asks: .*; 1 hole was closed; is this the body that is meant\?/);
   near(glb, 'GLB');
   const inside = await drop(stlOf(dome({ radius: 6 }).map((facet) => facet.reverse())), 'inside-out.stl');
-  assert.match(inside.note, /; it was inside out: turned\./);
+  assert.match(inside.note, /; 384 triangles were turned; /);
   near(inside, 'turned');
+  const whole = await drop(stlOf(dome({ radius: 6 })), 'part.stl');
+  assert.equal(whole.note, closed.note, 'of a closed one nothing is asked any more');
   await keep('mesh-dropped');
   assert.equal(await page.locator('body[data-dragging]').count(), 0, 'nothing is dragged any more');
 });
@@ -489,12 +491,26 @@ test('an STL or a GLB dropped on the page presses, in mm or in metres, and what 
 test('what is no body is refused with the reason, and the last one goes on pressing', async () => {
   const before = await page.evaluate(() => globalThis.papilla.press.body.hello.triangles.length);
   const flat = dome({ radius: 6, isOpen: true }).map((facet) => facet.map(([x, y]) => [x, y, 0]));
-  for (const [bytes, name, why] of [[stlOf(flat), 'sheet.stl', /sheet\.stl is a surface without an inside: give it a thickness/], [new ArrayBuffer(10), 'notes.txt', /neither an STL nor a GLB/]]) {
+  const note = await page.locator('#mesh-note').textContent();
+  const size = await page.inputValue('#size');
+  for (const [bytes, name, why] of [[stlOf(flat), 'sheet.stl', /sheet\.stl: the surface has no inside: .* give a sheet a thickness/], [new ArrayBuffer(10), 'notes.txt', /notes\.txt: none of \.stl, \.obj, \.ply, \.glb/]]) {
     await page.setInputFiles('#mesh-file', { name, mimeType: 'model/stl', buffer: Buffer.from(bytes) });
     await until((pattern) => new RegExp(pattern).test(document.getElementById('notice').textContent), why.source);
   }
   await settled();
   assert.equal(await page.evaluate(() => globalThis.papilla.press.body.hello.triangles.length), before);
+  assert.deepEqual([await page.locator('#mesh-note').textContent(), await page.inputValue('#size')], [note, size]);
+  assert.ok((await felt()).forceN > 0.01, 'it presses');
+  // A hand meets the same objects, and takes a sheet back too.
+  await chooseRadio('mode', 'hand');
+  await until(() => globalThis.papilla.hand.count > 0);
+  await page.setInputFiles('#mesh-file', { name: 'sheet.stl', mimeType: 'model/stl', buffer: Buffer.from(stlOf(flat)) });
+  await until(() => /sheet\.stl: the surface has no inside/.test(document.getElementById('notice').textContent));
+  const rounds = await page.evaluate(() => globalThis.papilla.hand.count);
+  await until((count) => globalThis.papilla.hand.count > count, rounds);
+  assert.equal(await page.evaluate(() => globalThis.papilla.press.body.hello.triangles.length), before);
+  await chooseRadio('mode', 'press');
+  await settled();
   await chooseRadio('shape', 'plate');
   await page.fill('#depth', '1');
   await settled();
