@@ -180,7 +180,7 @@ export class HandView {
       this.told(hand.ready);
       for (const digit of this.digits) digit.changed = true;
     } catch (error) {
-      this.refused(error.message, error.problem);
+      this.refused(error.problem?.message ?? error.message, error.problem);
       this.reopen(RETRY_MS);
     }
     this.opening = false;

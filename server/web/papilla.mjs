@@ -107,7 +107,8 @@ class Page {
   #complain(message, problem) {
     const { control, press } = this;
     const isOfMesh = press.shape === 'mesh' && control.before !== null && problem?.code === 'bad_contact' && problem.field?.startsWith('objects');
-    this.complaint = isOfMesh ? `${control.mesh.name}: ${message}` : '';
+    // A visitor knows the file, and no member of a hello.
+    this.complaint = isOfMesh ? `${control.mesh.name}: ${message.replace(`${problem.field}: `, '')}` : '';
     notify(this.complaint || message);
     if (!isOfMesh) return;
     control.takeBack();

@@ -26,12 +26,18 @@ export function stlOf(facets) {
   return data;
 }
 
+/** Least and greatest of each coordinate, as the format wants them. */
+function rangeOf(values) {
+  const of = (pick) => [0, 1, 2].map((axis) => values.filter((_, k) => k % 3 === axis).reduce(pick));
+  return { min: of((a, b) => Math.min(a, b)), max: of((a, b) => Math.max(a, b)) };
+}
+
 /** A GLB of the triangles, each with corners of its own, in metres as the format has it. */
 export function glbOf(facetsMm) {
   const values = Float32Array.from(facetsMm.flat(2), (mm) => mm / 1000);
   const text = JSON.stringify({
     asset: { version: '2.0' }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0 }], meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }],
-    accessors: [{ bufferView: 0, componentType: 5126, count: values.length / 3, type: 'VEC3' }],
+    accessors: [{ bufferView: 0, componentType: 5126, count: values.length / 3, type: 'VEC3', ...rangeOf(values) }],
     bufferViews: [{ buffer: 0, byteLength: values.byteLength }], buffers: [{ byteLength: values.byteLength }],
   });
   const json = new TextEncoder().encode(text.padEnd(4 * Math.ceil(text.length / 4)));
