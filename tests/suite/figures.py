@@ -51,7 +51,7 @@ METHODS = {
     "second order, pixels": "pixels",
     "second order, gaps": "gaps",
 }
-# Decoding, encoding and sending a map, ms (docs/reports/latency.md, 'Where the time goes').
+# Decoding, encoding and sending a map, ms (docs/guides/operating.md, Sizing).
 BESIDE_MS = 0.12
 # The load to plan for, and the rate of a session.
 LOAD, RATE_HZ = 0.5, 90
