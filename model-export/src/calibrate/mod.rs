@@ -71,7 +71,11 @@ pub(crate) const GROUPS: [&str; 5] =
 
 /// The sets, in the order of tables. No network was trained on any of their states.
 pub const SETS: [Set; 11] = [
-    Set { folder: "broad-graded", about: "shapes and depths of the training", ..Set::PLAIN },
+    Set {
+        folder: "broad-graded",
+        about: "shapes and depths of the training, the held-out part: *other simulations*",
+        ..Set::PLAIN
+    },
     Set { folder: "more-graded", about: "likewise", ..Set::PLAIN },
     Set {
         folder: "fidelity",
@@ -81,7 +85,7 @@ pub const SETS: [Set; 11] = [
     },
     Set {
         folder: "heldout-graded",
-        about: "shapes that training never saw",
+        about: "shapes that training never saw: *unseen shapes*",
         part: Part::All,
         group: "unseen shapes",
         ..Set::PLAIN
@@ -113,7 +117,7 @@ pub const SETS: [Set; 11] = [
     },
     Set {
         folder: "s1-graded",
-        about: "one plate at angles to 45 degrees",
+        about: "one plate at angles to 45 degrees; every 16th of its states",
         part: Part::All,
         group: "tilted plates",
         simulations_max: 15.0,
@@ -122,7 +126,7 @@ pub const SETS: [Set; 11] = [
     },
     Set {
         folder: "final",
-        about: "other shapes, on the finest mesh",
+        about: "other shapes, on the finest mesh: the *reference set*",
         part: Part::All,
         group: "set aside",
         is_final: true,
@@ -130,7 +134,7 @@ pub const SETS: [Set; 11] = [
     },
     Set {
         folder: "final-anew",
-        about: "the same shapes in other poses",
+        about: "the same shapes in other poses: *twelve more*",
         part: Part::All,
         group: "set aside",
         is_final: true,

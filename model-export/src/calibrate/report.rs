@@ -73,7 +73,7 @@ fn percent(value: f64) -> String {
 }
 
 fn sets(text: &mut String) {
-    text.push_str("## Sets\n\n| set | what it holds | group |\n|---|---|---|\n");
+    text.push_str("## Sets\n\nWords in italics are the names of these sets on [other pages](../concepts/accuracy.md#test-sets).\n\n| set | what it holds | group |\n|---|---|---|\n");
     for set in SETS {
         let _ = writeln!(text, "| `{}` | {} | {} |", set.folder, set.about, set.group);
     }
@@ -83,7 +83,7 @@ fn sets(text: &mut String) {
 fn rows(text: &mut String, rows: &[Row]) {
     text.push_str(
         "| set | answers | stated | true error: median, % | 90th percentile, % | stated: median, % | bound, % | \
-         bound over median | below the median, % | below the bound, % | worst, times its bound |\n\
+         bound over median | below the median, % | below the bound, % | worst error / its bound |\n\
          |---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows {
@@ -166,12 +166,12 @@ fn costs(text: &mut String, cost: &Cost) {
         text,
         "\n## Cost\n\n\
          Each part was run {runs} times in turn in one process, on a machine that was busy with other work. The\n\
-         least time counts. What is new is the sum of SED and the laws: {share:.1} % of the time of `{network}`.\n\
-         Nothing of it allocates memory.\n\n\
+         least time counts. An error estimate adds the sum of SED and the laws: {share:.1} % of the time of `{network}`.\n\
+         The pass over the pressure is made in any case, to recognise unfamiliar maps. Nothing of it allocates memory.\n\n\
          | part of a frame | time, us |\n|---|---|\n\
-         | greatest SED, as before | {peak_us:.1} |\n\
+         | greatest SED, without an error estimate | {peak_us:.1} |\n\
          | greatest SED and the sum, in one pass | {peak_and_sum_us:.1} |\n\
-         | pass over the pressure, which tells strange maps, too | {look_us:.1} |\n\
+         | pass over the pressure, which also recognises unfamiliar maps | {look_us:.1} |\n\
          | facts and law, of SED and of force | {laws_us:.1} |\n\
          | network `{network}` | {network_us:.0} |\n",
         runs = super::cost::RUNS,

@@ -22,8 +22,10 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
     if let Some(floor) = &ladder.discretisation_error {
         let _ = writeln!(
             text,
-            "The SED of the reference itself errs by about {} (relative L2 norm). Differences between ways that are smaller\n\
-             than this mean nothing. How this was estimated: {}.\n",
+            "The SED of the reference itself errs by about {} (relative L2 norm). How this was estimated: {}\n\
+             ([more](../concepts/accuracy.md#two-truths)). On the sets whose truth is the reference, smaller differences between\n\
+             ways mean nothing. On all others a smaller difference says which way is nearer to the teacher, and not which is\n\
+             nearer to the truth.\n",
             percent(floor.sed_relative_l2),
             floor.how
         );
@@ -39,24 +41,30 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
         readings(&mut text, found);
     }
     if !ladder.traction.is_empty() {
-        traction(&mut text, &ladder.traction);
+        traction(&mut text, ladder);
     }
     zone(&mut text, stem);
     text
 }
 
-fn traction(text: &mut String, found: &[Traction]) {
+fn traction(text: &mut String, ladder: &Ladder) {
     text.push_str(
         "## With traction along the skin\n\n\
          The truth of this table is the teacher with a coefficient of friction of 0.5; no network was trained on friction. In\n\
-         the set `friction` the indenter goes straight in. In `sliding` it is then dragged aside by up to 1.1 mm; each\n\
-         simulation has three states on the way in and two on the way aside. *Pressure alone* is the relative L2 error of the\n\
+         the set `friction` the indenter goes straight in. In `sliding` it is then dragged aside by up to 1.1 mm; each of its\n\
+         three simulations has three states on the way in and two on the way aside. Of so few states the 95th percentile is\n\
+         set by the one or two worst. *Pressure alone* is the relative L2 error of the\n\
          SED that a way answers. *With traction* is the error after the session effect `shear_energy` has added SED for the\n\
          traction along the skin ([how](../concepts/contact.md#friction)). Pressure and traction are those of FE. *Adds* is the\n\
          time of the effect.\n\n\
          | way | set | states | pressure alone | p95 | with traction | p95 | adds, ms | p95 |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
+    // From fast to slow, as in the other tables.
+    let order: Vec<&str> = by_time(ladder).map(|rung| rung.name.as_str()).collect();
+    let place = |model: &str| order.iter().position(|name| *name == model);
+    let mut found: Vec<&Traction> = ladder.traction.iter().collect();
+    found.sort_by_key(|of| (of.set.as_str(), place(&of.model)));
     for Traction { model, set, samples, alone, felt, added_ms } in found {
         let [alone, felt] = [alone, felt].map(|of| spread(Some(*of)));
         let _ = writeln!(
@@ -78,7 +86,8 @@ fn readings(text: &mut String, found: &Readings) {
          Each of {} states of the reference was solved on two meshes, its own and `{}`, which gives two pressure\n\
          maps of the same state. A network can only know the map that it is given. So the difference between its answers to\n\
          the two maps is a part of its error that no training can take away. The table compares the two pressure maps, and\n\
-         each network's two answers.\n\n\
+         each network's two answers. Smoothing takes away half of the difference of the pressure maps: so half of it is in\n\
+         detail finer than some 0.1 mm.\n\n\
          | relative L2 between the two | median | p95 |\n|---|---|---|\n",
         found.states, found.mesh
     );
@@ -111,7 +120,9 @@ fn costs(text: &mut String, ladder: &Ladder) {
         text.push(')');
     }
     text.push_str(
-        ".\n\n| way | kind | tract p50, ms | p99 | ONNX Runtime p50, ms | p99 | load, ms | memory, MiB | file, kB |\n\
+        ".\n\nThe first times are those of the service's backend, whose name is *tract*, also in the JSON files. It evaluates the\n\
+         networks of the service by rows, in code of its own; the library tract itself runs both U-Nets and `half-space`.\n\n\
+         | way | kind | as the service runs it: p50, ms | p99 | ONNX Runtime p50, ms | p99 | time to load, ms | memory, MiB | file, kB |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
     for rung in by_time(ladder).filter(|rung| ![Kind::Fe, Kind::Floor].contains(&rung.kind)) {
@@ -209,8 +220,8 @@ fn zone(text: &mut String, stem: &str) {
          The zone is the interface from {:.0} to {:.0} mm behind the tip (x in the undeformed finger's frame). The nail plate\n\
          of the default fingertip ends at 14 mm, so the zone reaches 2 mm to either side of that edge. It holds the nail's\n\
          matrix and fold. An object that presses the pad rarely touches the skin here, but it loads this zone through the\n\
-         tissue. The U-Net paper reports that its network misses the SED there. A network has to miss it if each pixel of its\n\
-         answer depends on no more than the pressure within 2 to 3 mm.\n",
+         tissue. The U-Net paper reports that its network misses the SED there. Any network has to miss it, of which each pixel\n\
+         of the answer depends on no more than the pressure within 2 to 3 mm.\n",
         NAIL_BASE_MM.start, NAIL_BASE_MM.end
     );
 }
@@ -233,7 +244,7 @@ pub(super) fn kind(kind: Kind) -> &'static str {
         Kind::ClosedForm => "closed form",
         Kind::Operator => "operator",
         Kind::Network => "network",
-        Kind::PublishedUNet => "published U-Net",
+        Kind::PublishedUNet => "rebuilt U-Net",
         Kind::Fe => "finite elements",
         Kind::Floor => "floor",
     }
@@ -257,7 +268,7 @@ fn number(value: Option<f64>, digits: usize) -> String {
 
 fn percent(value: f64) -> String {
     let value = 100.0 * value;
-    if value < 10.0 { format!("{value:.2} %") } else { format!("{value:.1} %") }
+    if value < 10.0 { format!("{value:.1} %") } else { format!("{value:.0} %") }
 }
 
 fn spread(spread: Option<Spread>) -> String {

@@ -102,7 +102,13 @@ fn slip(form: Form, frictions: &[f64]) -> Result<Vec<Check>, CaseError> {
         let (solver, report) = form.dragged(&problem, friction, 3.0)?;
         let [x, y, z] = solver.balance().contact_force_n;
         let quantity = |what: &str| format!("dragged 3 mm, mu {friction}{}: {what}", form.name);
-        rows.push(Check::relative(quantity("T / N"), (x / z).abs(), friction, 1e-3, SOURCE));
+        rows.push(Check::relative(
+            quantity("drag / pressing force"),
+            (x / z).abs(),
+            friction,
+            1e-3,
+            SOURCE,
+        ));
         rows.push(Check::vanishes(quantity("sideways force / N"), y / z, 1e-6, "symmetry"));
         // More friction folds the block's edge under within a step: eight are too few for its work.
         if friction <= 0.5 {

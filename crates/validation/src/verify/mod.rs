@@ -113,7 +113,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "disc",
-        shows: "A uniformly loaded disc sinks into a half-space as Boussinesq's solution says.",
+        shows: "A half-space under a uniform load on a circle sinks in as Boussinesq's solution says.",
         quick: true,
         run: disc::run,
     },
@@ -190,7 +190,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "solid-parts",
-        shows: "With elastic bone and nail, 5e5 times as stiff as fat, the solution converges, \
+        shows: "With elastic bone and nail, 5e5 times as stiff as subcutaneous tissue, the solution converges, \
                 balances hold, and the force is that with a rigid bone.",
         quick: false,
         run: solid_parts::run,

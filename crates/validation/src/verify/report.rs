@@ -25,7 +25,12 @@ const INTRODUCTION: &str = "# Verification
 **Question.** Does the finite-element solver give the results that theory, the literature and its own invariants
 ask for?
 
-**Method.** The command solves problems with known results, with the same solver that simulates fingers. A *case* is
+**What it means.** Yes: all comparisons are within their tolerances. This checks the solver, and not how well the
+fingertip stands for a real one. The model is compared with [another program](../../studies/reports/calculix.md) and
+[with people](../../studies/reports/human.md) elsewhere.
+
+**Method.** The command `fe-datagen verify` solves problems with known results, with the same solver that simulates
+fingers. A *case* is
 a kind of problem, such as a sphere on a half-space. It has several *comparisons*, each of one number with its truth,
 and each with a tolerance of its own. The command writes this page and [all comparisons](verification.csv). It exits
 with code 3 if a difference is above its tolerance.
@@ -70,7 +75,7 @@ Of each case this table has one comparison: the one that uses up most of its tol
 |---|---|
 | comparison | what is compared |
 | this code, truth | the two numbers. Some numbers only have to stay below a bound; then the bound stands as the truth |
-| difference | relative to the truth. It is absolute if the truth is zero, and for orders of convergence. For a bound it is 0 as long as the bound is kept |
+| difference | computed from all digits, relative to the truth. It is absolute if the truth is zero, and for orders of convergence. For a bound it is 0 as long as the bound is kept; how near the number is to it show the two columns before |
 | allowed | the tolerance, or `bound` |
 
 | case | comparison | this code | truth | source of the truth | difference | allowed |
@@ -160,7 +165,7 @@ impl Report {
     pub fn summary(&self) -> String {
         let failed = self.rows.iter().filter(|r| !r.check.pass).count();
         let seconds = self.seconds();
-        format!("{} rows, {failed} past tolerance, {seconds:.0} s", self.rows.len())
+        format!("{} comparisons, {failed} past tolerance, {seconds:.0} s", self.rows.len())
     }
 
     fn of<'a>(&'a self, case: &'a str) -> impl Iterator<Item = &'a Row> {
@@ -257,6 +262,6 @@ mod tests {
             all += count;
         }
         assert_eq!(all, rows.lines().count(), "a case that is no more");
-        assert!(page.contains(&format!("{all} rows, 0 past tolerance")));
+        assert!(page.contains(&format!("{all} comparisons, 0 past tolerance")));
     }
 }
