@@ -1,6 +1,7 @@
 """What the runs in tests/*/run share: a papilla-server with the shipped models, a look at it, and at the processor."""
 
 import os
+import platform
 import subprocess
 import sys
 import time
@@ -40,10 +41,14 @@ def resident_kib(pid: int) -> int:
 
 def processor_entries() -> dict[str, str]:
     """What Linux says of the last processor, by name, such as `flags`."""
-    lines = (line.partition(":") for line in Path("/proc/cpuinfo").read_text().splitlines())
-    return {key.strip(): value.strip() for key, _, value in lines}
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    return {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
 
 
 def processor() -> str:
-    """Its name; family and model too, since a virtual machine may name the maker alone."""
-    return "{model name} (family {cpu family}, model {model})".format_map(processor_entries())
+    """Its name, with family and model, since a virtual machine may name the maker alone; and the number of cores."""
+    entries, cores = processor_entries(), f"{os.cpu_count()} cores"
+    if not {"model name", "cpu family", "model"} <= entries.keys():
+        return f"{platform.machine()}, {cores}"
+    return "{model name} (family {cpu family}, model {model})".format_map(entries) + f", {cores}"

@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from service import RELEASE, ROOT  # noqa: E402
+from service import RELEASE, ROOT, processor  # noqa: E402
 from sessions import FRAME, SESSIONS, hello_of, payload_of, slivers  # noqa: E402
 
 HOST, PORT = "127.0.0.1", 7323
@@ -375,8 +375,6 @@ KINDS = """| four clients send | which is |
 
 def markdown(found: dict) -> str:
     """The report of a run (docs/reports/neighbours.md)."""
-    cpus = Path("/proc/cpuinfo").read_text()
-    name = next((line.split(":")[1].strip() for line in cpus.splitlines() if line.startswith("model name")), "?")
     sound = sum(row["sound"] for row in found["rows"])
     lines = [
         "# A neighbour beside floods",
@@ -397,7 +395,7 @@ def markdown(found: dict) -> str:
         "```",
         "",
         *KINDS,
-        f"{time.strftime('%Y-%m-%d')}, {name}, {multiprocessing.cpu_count()} cores, which the service, the flooding clients and the session of 90 Hz share. Times in ms.",
+        f"{time.strftime('%Y-%m-%d')}, {processor()}, which the service, the flooding clients and the session of 90 Hz share. Times in ms.",
         f"**{sound} of {len(found['rows'])} are sound.**",
         "",
         "| transport | four clients send | taken by the service, MB/s | idle p99 | p50 | p99 | greatest | `/healthz`, greatest | lost | sound |",

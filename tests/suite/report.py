@@ -1,12 +1,15 @@
 """What a run came to: the last lines, JSON, and the page of reports."""
 
 import json
-import platform
 import subprocess
+import sys
 from datetime import datetime, timezone
 from pathlib import Path
 
 from schedule import Outcome
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from service import processor  # noqa: E402
 
 RECORD = Path("docs/reports/tests.json")
 PAGE = Path("docs/reports/tests.md")
@@ -19,17 +22,6 @@ all processes of a part.
 | part | of | last run | commit | processor | outcome | tests | wall, s | processor, s |
 |---|---|---|---|---|---|---|---|---|
 """
-
-
-def processor() -> str:
-    """Model and number of cores, as the system names them."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        name = platform.machine()
-    cores = subprocess.run(["nproc"], capture_output=True, text=True, check=False).stdout.strip()
-    return f"{name}, {cores or '?'} cores"
 
 
 def summary(outcomes: list[Outcome], wall_s: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
 import numpy as np
@@ -20,6 +21,10 @@ UNITS: Final[dict[str, dict[str, float]]] = {
 """Units that a series may come in, by the hello's `input`: the first is the protocol's."""
 # Below these a series in the protocol's unit is asked about: no touch is so weak, no scene so small.
 _ASKED_BELOW: Final = {"pressure": 150.0, "objects": 0.2, "gaps": 0.2}
+# Numbers that are looked at together, so that they are still in a processor's cache at the second look, and numbers
+# that are worth a thread.
+_TOGETHER: Final = 2**17
+_OF_A_THREAD: Final = 2**22
 
 
 def numbers(values: ArrayLike, member: str) -> NDArray[Any]:
@@ -115,10 +120,50 @@ def frame(values: ArrayLike, due: tuple[int, ...], kind: str, number: int, facto
     least, greatest = float(result.min()), float(result.max())
     if not (math.isfinite(least) and math.isfinite(greatest)):
         raise BadInput("frames", f"{_first(~np.isfinite(result), array)}; find out why, or leave the frame out", number)
-    if kind == "pressure" and least < 0.0 and len(due) == 2:
+    if least < 0.0 and _is_pressed(due, kind):
         why = "skin is pressed, never pulled: take the sensor's offset away, then np.maximum(frames, 0)"
         raise BadInput("frames", f"{_first(result < 0, array)}; {why}", number)
     return result
+
+
+def _is_pressed(due: tuple[int, ...], kind: str) -> bool:
+    """Whether the values are pressure, and none of them is a part of a traction."""
+    return kind == "pressure" and len(due) == 2
+
+
+def every_frame(frames: NDArray[Any], due: tuple[int, ...], kind: str, factor: float, threads: int) -> float:
+    """Looks at all frames of an array, and gives their greatest size; raises BadInput as `frame`."""
+    step = max(1, _TOGETHER // max(1, math.prod(due)))
+    is_pressed = _is_pressed(due, kind)
+
+    def greatest(first: int, end: int) -> float:
+        found = 0.0
+        for at in range(first, end, step):
+            some = in_unit(frames[at : min(at + step, end)], kind, factor)
+            if not some.size:
+                continue
+            least, most = float(some.min()), float(some.max())
+            if not (math.isfinite(least) and math.isfinite(most)) or (is_pressed and least < 0.0):
+                for number in range(at, min(at + step, end)):
+                    frame(frames[number], due, kind, number, factor)
+            found = max(found, size_of(some, kind) if kind == "objects" else max(most, -least))
+        return found
+
+    count = len(frames)
+    threads = min(threads, count * max(1, math.prod(due)) // _OF_A_THREAD)
+    if threads <= 1:
+        return greatest(0, count)
+    with ThreadPoolExecutor(threads, "papilla-check") as pool:
+        # In order, so that the first frame that is wrong is told.
+        ends = [count * part // threads for part in range(threads + 1)]
+        return max(pool.map(greatest, ends[:-1], ends[1:]))
+
+
+def size_of(values: NDArray[np.float32], kind: str) -> float:
+    """The greatest size of what has a unit."""
+    if kind == "objects":
+        values = values[..., :3]
+    return max(float(values.max()), -float(values.min())) if values.size else 0.0
 
 
 def in_unit(array: NDArray[Any], kind: str, factor: float) -> Map:

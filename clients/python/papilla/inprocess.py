@@ -6,6 +6,7 @@ import json
 import os
 import threading
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future
 from types import TracebackType
 from typing import Any, Final
@@ -180,6 +181,42 @@ class LocalSession(Calls):
             head, samples = message[: wire.HEADER.size], memoryview(message)[wire.HEADER.size :]
             return self._frame(head, samples, sequence, time_us, finger)
 
+    def render_rows(
+        self,
+        kind: str,
+        frames: Sequence[NDArray[np.float32]],
+        times_us: Sequence[int],
+        rooms: Sequence[list[tuple[int, NDArray[np.uint8]]]],
+    ) -> tuple[int, Problem] | None:
+        """Renders frames of the hello's `input`, one after the other, and writes parts of their answers.
+
+        `rooms` has for each frame places in the message of its answer, and a room of as many bytes as go there.
+        Frames are not looked at. Gives the number of the frame that is refused, which ends it, and why.
+        """
+        sent: list[tuple[bytes, bytes | memoryview, list[tuple[int, NDArray[np.uint8]]]]] = []
+        with self._lock:
+            for values, at_us, own in zip(frames, times_us, rooms, strict=True):
+                rows = np.atleast_2d(values)
+                sequence, time_us = self._next(at_us)
+                if kind == "pressure":
+                    window = (0, 0, rows.shape[1], rows.shape[0])
+                    head, body = wire.parts(rows, window, self._ready["sample_type"], sequence, time_us, 0)
+                    sent.append((head, _bytes(body), own))
+                else:
+                    message = wire.encode_rows(kind, rows, None, 0, sequence, time_us)
+                    sent.append((message[: wire.HEADER.size], memoryview(message)[wire.HEADER.size :], own))
+            failed = self._native.frames(sent)
+        if failed is not None:
+            number, code, words, field = failed
+            problem = Problem(code, words, field)
+            self._warned.once(problem.code, told_refused(problem))
+            return number, problem
+        return None
+
+    def warn_beyond(self) -> None:
+        """Logs once that an answer had the flag `out_of_range`."""
+        self._warned.once("out_of_range", told_beyond(self._ready["tier"]))
+
     def _next(self, client_time_us: int | None) -> tuple[int, int]:
         if self._closed:
             raise Closed("the session is closed")
@@ -193,10 +230,10 @@ class LocalSession(Calls):
             problem = Problem(refused.code, refused.message, refused.field)
             self._warned.once(problem.code, told_refused(problem))
             return Answer(sequence, "error", time_us, problem=problem, finger=finger)
-        header, tier = wire.decode(message), self._ready["tier"]
+        header = wire.decode(message)
         if "out_of_range" in header.flags:
-            self._warned.once("out_of_range", told_beyond(tier))
-        return answers.read(message, header, self._ready, tier)
+            self.warn_beyond()
+        return answers.read(message, header, self._ready, self._ready["tier"])
 
 
 def _done(answer: Answer) -> Future[Answer]:

@@ -223,6 +223,8 @@ def _distance_mm(one: Any, other: Any) -> float:
 
 def _crossed(body: Any) -> str | None:
     """Words for two triangles that share no vertex and cross."""
+    # Whoever computes contact finds crossings too, but counts the triangles that lie inside and says no place; and
+    # most people load a mesh before there is a session.
     vertices, faces = np.asarray(body.vertices, np.float64), np.asarray(body.faces, np.int64)
     corners = vertices[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)

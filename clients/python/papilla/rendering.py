@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
 from .errors import BadInput
 from .http import DEFAULT_URL, LOCAL
-from .send_series import Progress, Source, Terms, parts
+from .send_series import LANES_MAX, Progress, Source, Terms, parts
 from .series import Series, joined
 from .sync import Session
 
 if TYPE_CHECKING:
     from .calls import Calls
     from .inprocess import LocalSession
-
-_LANES_MAX: Final = 4
 
 
 def render_chunks(
@@ -52,7 +50,7 @@ def _rendered(
     with _opened(url, token, hello) as first:
         source = Source(frames, times, unit, Terms.of(hello, first.ready))
         if lanes is None:
-            lanes = 1 if source.remembers else max(1, min(_LANES_MAX, os.cpu_count() or 1, source.count or _LANES_MAX))
+            lanes = 1 if source.remembers else max(1, min(LANES_MAX, os.cpu_count() or 1, source.count or LANES_MAX))
         elif lanes < 1 or (lanes > 1 and source.remembers):
             raise BadInput("lanes", f"{lanes}; a series whose frames depend on those before goes over one")
         others = [_opened(url, token, hello, first) for _ in range(lanes - 1)]

@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import itertools
 import logging
+import os
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Final, NamedTuple, Protocol, TypeAlias
+from typing import Any, Final, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import check
-from .answer import Answer
+from .answer import Answer, Problem
 from .errors import BadInput, FrameFailed
+from .rows import Rows
 from .series import Columns, Series, joined
 from .wire import SIDE_PX, Window
 
 Progress: TypeAlias = bool | Callable[[int, int | None], None] | None
 """True draws a line on stderr; a function gets the frames done, and all frames where their number is known."""
+LANES_MAX: Final = 4
+"""Sessions side by side, unless it is said how many."""
+_TOGETHER_MAX: Final = 8
+"""Frames that a session in process takes together, so that its threads wait little for Python and end together."""
 _PATIENCE_S: Final = 60.0
 _TRIES: Final = 3
 _SLOW_S: Final = 1.0
@@ -49,6 +55,21 @@ class Session(Protocol):
     def send_poses(self, poses: ArrayLike, *, client_time_us: int | None) -> Future[Answer]: ...
 
     def send_gaps(self, depth_mm: ArrayLike, *, client_time_us: int | None) -> Future[Answer]: ...
+
+
+@runtime_checkable
+class InProcess(Protocol):
+    """What only a session in process has: `papilla.LocalSession`."""
+
+    def render_rows(
+        self,
+        kind: str,
+        frames: Sequence[NDArray[np.float32]],
+        times_us: Sequence[int],
+        rooms: Sequence[list[tuple[int, NDArray[np.uint8]]]],
+    ) -> tuple[int, Problem] | None: ...
+
+    def warn_beyond(self) -> None: ...
 
 
 class Terms(NamedTuple):
@@ -89,7 +110,10 @@ class Frame(NamedTuple):
 
     number: int
     time_us: int
-    values: NDArray[np.float32]
+    values: NDArray[Any]
+    """As they came."""
+    factor: float
+    """To the protocol's unit; 1 where they are in it."""
 
 
 class Source:
@@ -122,10 +146,8 @@ class Source:
         self._looked_at = isinstance(frames, np.ndarray)
         if isinstance(frames, np.ndarray):
             # All of it before the first frame leaves, and not once more when it does.
-            greatest = 0.0
-            for number, values in enumerate(frames):
-                looked_at = check.frame(values, terms.shape, terms.kind, number, self._factor)
-                greatest = max(greatest, self._size(looked_at))
+            threads = min(LANES_MAX, os.cpu_count() or 1)
+            greatest = check.every_frame(frames, terms.shape, terms.kind, self._factor, threads)
             if self._ask:
                 check.ask_unit(greatest, terms.kind)
                 self._ask = False
@@ -144,25 +166,19 @@ class Source:
             self._next += 1
             if self.times_s is not None and number >= len(self.times_s):
                 raise BadInput("times", f"there are {len(self.times_s)}, and more frames than that")
-            if self._looked_at:
-                looked_at = check.in_unit(values, self.terms.kind, self._factor)
-            else:
-                looked_at = check.frame(values, self.terms.shape, self.terms.kind, number, self._factor)
+            factor = self._factor
+            if not self._looked_at:
+                values, factor = check.frame(values, self.terms.shape, self.terms.kind, number, factor), 1.0
             # Stills all have the same time, so that nothing counts as motion.
             time_us = 0
             if self.times_s is not None:
                 time_us = round(1e6 * (self.times_s[number] - self.times_s[0]))
-            taken.append(Frame(number, time_us, looked_at))
+            taken.append(Frame(number, time_us, values, factor))
         if self._ask and taken:
-            greatest = max(self._size(frame.values) for frame in taken)
+            greatest = max(check.size_of(frame.values, self.terms.kind) for frame in taken)
             check.ask_unit(greatest, self.terms.kind)
             self._ask = greatest == 0.0
         return taken
-
-    def _size(self, values: NDArray[np.float32]) -> float:
-        if self.terms.kind == "objects":
-            values = values[:, :3]
-        return max(float(values.max()), -float(values.min())) if values.size else 0.0
 
 
 class _Meter:
@@ -174,12 +190,13 @@ class _Meter:
         self._done = 0
         self._lock = threading.Lock()
 
-    def step(self) -> None:
+    def step(self, frames: int) -> None:
         if self._tell is None:
             return
         with self._lock:
-            self._done += 1
-            self._tell(self._done, self._total)
+            for _ in range(frames):
+                self._done += 1
+                self._tell(self._done, self._total)
 
 
 def line(done: int, total: int | None) -> None:
@@ -191,11 +208,12 @@ def line(done: int, total: int | None) -> None:
 
 def _send(session: Session, frame: Frame, terms: Terms) -> Answer:
     """One frame, and its outcome."""
+    values = check.in_unit(frame.values, terms.kind, frame.factor)
     if terms.kind == "objects":
-        return session.send_poses(frame.values, client_time_us=frame.time_us).result()
+        return session.send_poses(values, client_time_us=frame.time_us).result()
     if terms.kind == "gaps":
-        return session.send_gaps(frame.values, client_time_us=frame.time_us).result()
-    rows = np.atleast_2d(frame.values)
+        return session.send_gaps(values, client_time_us=frame.time_us).result()
+    rows = np.atleast_2d(values)
     window = (0, 0, rows.shape[1], rows.shape[0])
     return session.send(rows, window=window, client_time_us=frame.time_us).result()
 
@@ -217,25 +235,72 @@ def _outcome(session: Session, frame: Frame, terms: Terms, remembers: bool) -> A
     raise FrameFailed(frame.number, answer.status, reason)
 
 
+class _Answers:
+    """Frames of a service's sessions: one by one."""
+
+    together = 1
+
+    def __init__(self, sessions: Sequence[Session], frames: list[Frame], source: Source) -> None:
+        self._source = source
+        self._columns = Columns(len(frames), sessions[0].ready, source.remembers)
+
+    def take(self, session: Session, first: int, frames: list[Frame]) -> None:
+        for place, frame in enumerate(frames, first):
+            self._columns.put(place, _outcome(session, frame, self._source.terms, self._source.remembers))
+
+    def series(self, times_s: NDArray[np.float64] | None, warnings: Sequence[str], seconds: float) -> Series:
+        return self._columns.series(times_s, warnings, seconds)
+
+
+class _InProcess:
+    """Frames of sessions in process: some at a time, whose answers Rust writes where they stay."""
+
+    def __init__(self, sessions: Sequence[Session], frames: list[Frame], source: Source) -> None:
+        self._kind = source.terms.kind
+        self._rows = Rows(len(frames), sessions[0].ready)
+        self._tier = sessions[0].ready["tier"]
+        self.together = max(1, min(_TOGETHER_MAX, len(frames) // (4 * len(sessions))))
+
+    @staticmethod
+    def can(session: Session) -> bool:
+        return isinstance(session, InProcess) and Rows.fit(session.ready)
+
+    def take(self, session: Session, first: int, frames: list[Frame]) -> None:
+        assert isinstance(session, InProcess)
+        values = [check.in_unit(frame.values, self._kind, frame.factor) for frame in frames]
+        times_us = [frame.time_us for frame in frames]
+        failed = session.render_rows(self._kind, values, times_us, self._rows.rooms(first, len(frames)))
+        if failed is not None:
+            number, problem = failed
+            raise FrameFailed(frames[number].number, "error", problem.message)
+        if self._rows.has_flag("out_of_range", first, len(frames)):
+            session.warn_beyond()
+
+    def series(self, times_s: NDArray[np.float64] | None, warnings: Sequence[str], seconds: float) -> Series:
+        return self._rows.series(self._tier, times_s, warnings, seconds)
+
+
 def _work(sessions: Sequence[Session], frames: list[Frame], source: Source, meter: _Meter) -> Series:
     """Renders frames by sessions side by side; each has one frame under way, so none supersedes another."""
     begin = time.perf_counter()
-    columns = Columns(len(frames), sessions[0].ready, source.remembers)
-    todo = iter(enumerate(frames))
+    kind = _InProcess if all(_InProcess.can(session) for session in sessions) else _Answers
+    collected = kind(sessions, frames, source)
+    starts = iter(range(0, len(frames), collected.together))
     lock, stop = threading.Lock(), threading.Event()
 
     def lane(session: Session) -> None:
         while not stop.is_set():
             with lock:
-                place, frame = next(todo, (0, None))
-            if frame is None:
+                first = next(starts, None)
+            if first is None:
                 return
+            some = frames[first : first + collected.together]
             try:
-                columns.put(place, _outcome(session, frame, source.terms, source.remembers))
+                collected.take(session, first, some)
             except BaseException:
                 stop.set()
                 raise
-            meter.step()
+            meter.step(len(some))
 
     if len(sessions) == 1:
         lane(sessions[0])
@@ -246,12 +311,12 @@ def _work(sessions: Sequence[Session], frames: list[Frame], source: Source, mete
                 for done in lanes:
                     done.result()
             finally:
-                # Ctrl-C comes here: each lane ends with the frame that it has under way.
+                # Ctrl-C comes here: each lane ends with the frames that it has under way.
                 stop.set()
     first = frames[0].number
     times_s = None if source.times_s is None else source.times_s[first : first + len(frames)].copy()
     warnings = sorted({*source.notes, *(words for session in sessions for words in session.warnings)})
-    return columns.series(times_s, warnings, time.perf_counter() - begin)
+    return collected.series(times_s, warnings, time.perf_counter() - begin)
 
 
 def parts(sessions: Sequence[Session], source: Source, chunk: int, progress: Progress) -> Iterator[Series]:

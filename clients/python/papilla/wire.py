@@ -26,6 +26,13 @@ NetForce: TypeAlias = tuple[Sequence[float], float]
 
 WHOLE: Final[Window] = (0, 0, SIDE_PX, SIDE_PX)
 HEADER: Final = struct.Struct("<4sBBBBIHHQIfHHIIHBB")
+HEAD: Final = np.dtype(
+    [("magic", "S4"), ("version", "u1"), ("kind", "u1"), ("number", "u1"), ("status", "u1"), ("sequence", "<u4"),
+     ("width", "<u2"), ("height", "<u2"), ("client_time_us", "<u8"), ("total_us", "<u4"), ("scale", "<f4"),
+     ("column", "<u2"), ("row", "<u2"), ("queue_us", "<u4"), ("infer_us", "<u4"), ("tier", "<u2"), ("flags", "u1"),
+     ("finger", "u1")]
+)  # fmt: skip
+"""The same for many answers at once."""
 _SAMPLES: Final[dict[str, tuple[int, str, float]]] = {
     # name: number on the wire, numpy's name, greatest unit (0: not scaled)
     "f32": (0, "<f4", 0.0),
@@ -224,4 +231,13 @@ def scaled(message: Message, offset: int, count: int, sample_type: str, scale: f
     values = _values(message, dtype, count, offset)
     if unit_max:
         values *= np.float32(scale)
+    return values
+
+
+def scaled_rows(rows: NDArray[np.uint8], sample_type: str, scale: NDArray[np.float32]) -> Map:
+    """The same of many answers, a row each."""
+    _, dtype, unit_max = _SAMPLES[sample_type]
+    values = rows.view(dtype).astype(np.float32, copy=False)
+    if unit_max:
+        values *= scale[:, None]
     return values

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import papilla
+from papilla import check
 
 BALL = {"shape": {"shape": "sphere", "radius_mm": 10}}
 
@@ -136,6 +137,21 @@ def spoilt(values, number=3, row=10, column=20):
 def test_bad_input_is_named_with_its_cure(url, frames, more, words):
     with pytest.raises(papilla.BadInput, match=words):
         papilla.render(frames, url=url, **more)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_the_first_of_the_bad_frames_is_named_by_several_threads(threads, monkeypatch):
+    monkeypatch.setattr(check, "_OF_A_THREAD", 16)
+    monkeypatch.setattr(check, "_TOGETHER", 48)
+    frames = np.ones((100, 4, 4), np.float32)
+    frames[41, 2, 3] = 7.0
+    assert check.every_frame(frames, (4, 4), "pressure", 1e3, threads) == 7e3
+    frames[[30, 70], 1, 2] = -1.0
+    with pytest.raises(papilla.BadInput, match=r"frame 30: -1.0 at \[1, 2\]"):
+        check.every_frame(frames, (4, 4), "pressure", 1.0, threads)
+    poses = np.zeros((100, 1, 7))
+    poses[50, 0] = [0, -3, 0, 0, 0, 0, 9]
+    assert check.every_frame(poses, (1, 7), "objects", 1e3, threads) == 3e3
 
 
 def test_small_values_are_taken_where_their_unit_is_said(url):

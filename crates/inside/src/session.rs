@@ -33,8 +33,8 @@ pub struct Session {
     range: PressureRange,
     hello: Hello,
     maps: Maps,
-    /// Sections of the last answer.
-    bytes: BytesMut,
+    /// Room for a header, and behind it the sections of the last answer.
+    message: BytesMut,
     /// Time that the network took when the session was opened.
     infer: Duration,
 }
@@ -133,12 +133,12 @@ impl Session {
             range,
             hello: hello.clone(),
             maps,
-            bytes: BytesMut::new(),
+            message: BytesMut::new(),
             infer,
         };
         let end = |s: &Section| (s.offset + s.bytes) as usize;
         let most = session.sections().iter().map(end).max().unwrap_or(0);
-        session.bytes.reserve(most);
+        session.message.reserve(most);
         Ok(session)
     }
 
@@ -245,7 +245,16 @@ impl Session {
     /// Sections of the answer to the last frame that was rendered, the first at byte 0.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+        self.message.get(HEADER_LEN..).unwrap_or_default()
+    }
+
+    /// The answer to the last frame that was rendered, as a service would send it: this header, and the
+    /// sections behind it.
+    pub fn message(&mut self, header: &FrameHeader) -> &[u8] {
+        if let Some(room) = self.message.first_chunk_mut() {
+            *room = header.encode();
+        }
+        &self.message
     }
 
     /// SED of the last frame that was rendered, 224 x 224, J/m3.
@@ -265,9 +274,10 @@ impl Session {
         frame: Frame<'_>,
         time_us: u64,
     ) -> Result<Made, Problem> {
-        self.bytes.clear();
+        self.message.clear();
+        self.message.resize(HEADER_LEN, 0);
         let shows_sed = self.shows_sed();
-        let Self { model, of, hand, effects, maps, range, network, bytes, .. } = self;
+        let Self { model, of, hand, effects, maps, range, network, message: answer, .. } = self;
         let Some(of_finger) = hand.fingers().get(finger) else {
             let fingers = hand.fingers().len();
             let message = format!("finger {finger} was not announced; there are {fingers}");
@@ -338,15 +348,15 @@ impl Session {
         found |= rendering.flags();
         let (time_us, errors) = (rendering.time_us(), rendering.error_estimate());
         rendering.end(network.as_mut()).map_err(|error| of_engine(&error))?;
-        of_finger.write(bytes);
-        papilla_render::require_finite(bytes)?;
+        of_finger.write(answer);
+        papilla_render::require_finite(&answer[HEADER_LEN..])?;
         if tells_error {
-            bytes.extend_from_slice(&errors.encode());
+            answer.extend_from_slice(&errors.encode());
         }
         let (window, scale) = (Window::WHOLE, 1.0);
         let mut made = Made { flags: found, shows_sed, window, scale, infer, errors };
         if let Some(effects) = effects {
-            let written = effects.write(&maps.pressure_pa, &maps.sed_j_per_m3, time_us, bytes);
+            let written = effects.write(&maps.pressure_pa, &maps.sed_j_per_m3, time_us, answer);
             let written = written.map_err(|error| {
                 Problem::new(ErrorCode::Internal, format!("the answer cannot be written: {error}"))
             })?;
@@ -368,7 +378,7 @@ impl Session {
         }
         let map = Map { quantity: Quantity::Sed, values, source: &self.of.card.name };
         made.scale =
-            encode(Output::Samples(sample_type), map, &mut self.bytes).map_err(|error| {
+            encode(Output::Samples(sample_type), map, &mut self.message).map_err(|error| {
                 Problem::new(ErrorCode::Internal, format!("the map cannot be encoded: {error}"))
             })?;
         Ok(())

@@ -3,8 +3,8 @@
 use std::{sync::Mutex, time::Instant};
 
 use papilla_inside::{Frame, Made, Session as Inside};
-use papilla_proto::{ErrorCode, FrameHeader, FrameStatus, HEADER_LEN, Problem, ServerMessage};
-use pyo3::{buffer::PyBuffer, prelude::*, types::PyByteArray};
+use papilla_proto::{ErrorCode, FrameHeader, FrameStatus, Problem, ServerMessage};
+use pyo3::{buffer::PyBuffer, prelude::*, pybacked::PyBackedBytes, types::PyByteArray};
 
 use crate::border::{compute, error, lock, refused};
 
@@ -19,13 +19,33 @@ struct State {
     inside: Inside,
     /// Samples of the frame at hand.
     payload: Vec<u8>,
+    /// A frame is being rendered, or a panic ended it.
+    is_half_done: bool,
 }
 
 impl Session {
     pub(crate) fn new(inside: Inside) -> Self {
-        Self { state: Mutex::new(Some(State { inside, payload: Vec::new() })) }
+        let state = State { inside, payload: Vec::new(), is_half_done: false };
+        Self { state: Mutex::new(Some(state)) }
+    }
+
+    /// Lends what the session remembers, so that neither the interpreter's lock nor the session's is
+    /// held for the other's.
+    fn with<T>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> PyResult<T>) -> PyResult<T> {
+        let mut state = compute(py, || lock(&self.state).take())?.ok_or_else(|| closed(py))?;
+        let done = work(&mut state);
+        if !state.is_half_done {
+            *lock(&self.state) = Some(state);
+        }
+        done
     }
 }
+
+/// Places in an answer, and where what begins there goes.
+type Rooms = Vec<(usize, PyBuffer<u8>)>;
+
+/// Number of a frame that was refused; code, message and field of the problem.
+type RefusedFrame = (usize, String, String, Option<String>);
 
 fn closed(py: Python<'_>) -> PyErr {
     error(py, "Closed", ("the session is closed",))
@@ -63,35 +83,36 @@ impl Session {
     ) -> PyResult<Bound<'py, PyByteArray>> {
         let start = Instant::now();
         let header = header_of(py, head)?;
-        // Lent, so that neither the interpreter's lock nor the session's is held for the other's.
-        let mut state = compute(py, || lock(&self.state).take())?.ok_or_else(|| closed(py))?;
-        state.payload.resize(samples.item_count(), 0);
-        let read = samples.copy_to_slice(py, &mut state.payload);
-        drop(samples);
-        if let Err(problem) = read {
-            *lock(&self.state) = Some(state);
-            return Err(problem);
-        }
-        let (state, made) = compute(py, move || {
-            let made = state.render(&header);
-            (state, made)
-        })?;
-        let answer = made.map(|made| {
-            let total_us = u32::try_from(start.elapsed().as_micros()).unwrap_or(u32::MAX);
-            let mut head = header.answer(FrameStatus::Ok, total_us, made.scale);
-            head = head.windowed(made.window);
-            head.sample_type = state.inside.answer_sample_type();
-            head.infer_us = u32::try_from(made.infer.as_micros()).unwrap_or(u32::MAX);
-            (head.queue_us, head.tier, head.flags) = (0, 0, made.flags);
-            let sections = state.inside.bytes();
-            PyByteArray::new_with(py, HEADER_LEN + sections.len(), |room| {
-                room[..HEADER_LEN].copy_from_slice(&head.encode());
-                room[HEADER_LEN..].copy_from_slice(sections);
-                Ok(())
-            })
-        });
-        *lock(&self.state) = Some(state);
-        answer.map_err(|problem| refused(py, &problem))?
+        self.with(py, |state| match state.answer(py, &header, samples, start)? {
+            Ok(message) => Ok(PyByteArray::new(py, message)),
+            Err(problem) => Err(refused(py, &problem)),
+        })
+    }
+
+    /// Renders frames, each of a header and samples, one after the other. The bytes of an answer from an
+    /// offset on go into a room of that many bytes.
+    ///
+    /// Ends at the first frame that is refused, and gives it; the session goes on.
+    fn frames(
+        &self,
+        py: Python<'_>,
+        frames: Vec<(PyBackedBytes, PyBuffer<u8>, Rooms)>,
+    ) -> PyResult<Option<RefusedFrame>> {
+        self.with(py, |state| {
+            for (number, (head, samples, rooms)) in frames.into_iter().enumerate() {
+                // Ctrl-C.
+                py.check_signals()?;
+                let start = Instant::now();
+                let header = header_of(py, &head)?;
+                match state.answer(py, &header, samples, start)? {
+                    Ok(message) => fill(py, message, &rooms)?,
+                    Err(Problem { code, message, field }) => {
+                        return Ok(Some((number, code.as_str().to_owned(), message, field)));
+                    }
+                }
+            }
+            Ok(None)
+        })
     }
 
     /// Renders a frame again and again, and gives how long each time took here, ns. What a frame takes
@@ -106,19 +127,17 @@ impl Session {
         times: usize,
     ) -> PyResult<Vec<u64>> {
         let header = header_of(py, head)?;
-        let mut state = compute(py, || lock(&self.state).take())?.ok_or_else(|| closed(py))?;
-        state.payload = samples.to_vec();
-        let (state, found) = compute(py, move || {
-            let frame = |_| {
+        self.with(py, |state| {
+            state.payload = samples.to_vec();
+            let frame = |state: &mut State| -> Result<u64, Problem> {
                 let start = Instant::now();
                 state.render(&header)?;
                 Ok(u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX))
             };
-            let found = (0..times).map(frame).collect::<Result<Vec<_>, Problem>>();
-            (state, found)
-        })?;
-        *lock(&self.state) = Some(state);
-        found.map_err(|problem| refused(py, &problem))
+            let found =
+                compute(py, || (0..times).map(|_| frame(state)).collect::<Result<Vec<_>, _>>())?;
+            found.map_err(|problem| refused(py, &problem))
+        })
     }
 
     /// Ends the session.
@@ -127,9 +146,54 @@ impl Session {
     }
 }
 
+/// Writes parts of an answer into their rooms.
+fn fill(py: Python<'_>, message: &[u8], rooms: &[(usize, PyBuffer<u8>)]) -> PyResult<()> {
+    for (offset, room) in rooms {
+        let part = message.get(*offset..).and_then(|rest| rest.get(..room.item_count()));
+        let Some(part) = part else {
+            let (bytes, of) = (room.item_count(), message.len());
+            let words = format!("a room for {bytes} bytes at {offset} of an answer of {of}");
+            return Err(error(py, "NativeFault", (words,)));
+        };
+        room.copy_from_slice(py, part)?;
+    }
+    Ok(())
+}
+
 impl State {
+    /// Renders a frame; what comes of it is the whole message.
+    fn answer(
+        &mut self,
+        py: Python<'_>,
+        header: &FrameHeader,
+        samples: PyBuffer<u8>,
+        start: Instant,
+    ) -> PyResult<Result<&[u8], Problem>> {
+        // A copy, since other threads of Python may change them.
+        self.payload.resize(samples.item_count(), 0);
+        samples.copy_to_slice(py, &mut self.payload)?;
+        drop(samples);
+        let made = match compute(py, || self.render(header))? {
+            Ok(made) => made,
+            Err(problem) => return Ok(Err(problem)),
+        };
+        let total_us = u32::try_from(start.elapsed().as_micros()).unwrap_or(u32::MAX);
+        let mut head = header.answer(FrameStatus::Ok, total_us, made.scale).windowed(made.window);
+        head.sample_type = self.inside.answer_sample_type();
+        head.infer_us = u32::try_from(made.infer.as_micros()).unwrap_or(u32::MAX);
+        (head.queue_us, head.tier, head.flags) = (0, 0, made.flags);
+        Ok(Ok(self.inside.message(&head)))
+    }
+
     fn render(&mut self, header: &FrameHeader) -> Result<Made, Problem> {
-        let Self { inside, payload } = self;
+        self.is_half_done = true;
+        let made = self.render_payload(header);
+        self.is_half_done = false;
+        made
+    }
+
+    fn render_payload(&mut self, header: &FrameHeader) -> Result<Made, Problem> {
+        let Self { inside, payload, .. } = self;
         let finger = inside.check(header)?;
         let due = inside.form().payload_len(header);
         if payload.len() != due {

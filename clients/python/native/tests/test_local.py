@@ -188,3 +188,62 @@ def test_a_series_without_a_service_is_that_of_the_service(url, pressure_pa, mon
     monkeypatch.setenv("PAPILLA_MODELS", "nowhere")
     with pytest.raises(papilla.BadModels, match="nowhere"):
         papilla.render(frames, url="local")
+
+
+def series_of(kind):
+    """Frames of a series, and its times."""
+    rows, columns = np.mgrid[:224, :224]
+    if kind == "objects":
+        return POSES, None
+    if kind == "gaps":
+        return np.stack([0.8 - ((rows - 104) ** 2 + (columns - 112) ** 2) / 1000.0 - d for d in (0.0, 0.2, 0.5)]), None
+    bump = 9e3 * np.exp(-((columns - 118.0) ** 2 + (rows - 105.0) ** 2) / 250)
+    return np.linspace(0, 1, 20)[:, None, None] * bump, 0.01 * np.arange(20)
+
+
+PIN = {"input": "sed", "drive": "formula", "radius_mm": 1.0, "gain": 0.002, "threshold": 50, "max": 1,
+       "actuators": [{"at": {"px": [112, 90]}}]}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "hello"),
+    [
+        ("pressure", {"tier": "nano", "effects": ["summary", "afferents"]}),
+        ("pressure", {"tier": "nano", "effects": ["afferents"], "answer_sample_type": "f16", "sample_type": "u16"}),
+        ("pressure", {"tier": "nano", "effects": ["afferents"], "answer_sample_type": "u8"}),
+        ("pressure", {"tier": "nano", "effects": ["afferents"], "answer_layout": "vertices"}),
+        ("pressure", {"tier": "nano", "answer_layout": "vertices", "answer_sample_type": "u16"}),
+        ("pressure", {"tier": "nano", "effects": ["contact_window"]}),
+        ("pressure", {"tier": "nano", "effects": ["points", "actuators"], "map": False,
+                      "points": [{"px": [112, 90]}, {"px": [118, 105]}], "actuators": PIN}),
+        ("objects", {"tier": "nano", "objects": [RUBBED], "pressure": "map", "shear": True, "displacement": True}),
+        ("objects", {"objects": [BALL], "pressure": "vertices", "stiffness": True, "map": False}),
+        ("gaps", {"tier": "nano"}),
+    ],
+    ids=lambda hello: "-".join(str(value) for value in hello.values())[:60] if isinstance(hello, dict) else hello,
+)  # fmt: skip
+def test_all_quantities_of_a_series_are_those_of_the_service(url, kind, hello):
+    frames, times_s = series_of(kind)
+    here, there = (papilla.render(frames, times_s, url=at, input=kind, **hello) for at in ("local", url))
+    assert list(here.values) == list(there.values) and len(here.values) > 4
+    # What tells of this run's time.
+    clocks = {"total_us", "queue_us", "infer_us", "touch_solve_us"}
+    for name, values in there.values.items():
+        mine = here[name]
+        assert (mine.dtype, mine.shape) == (values.dtype, values.shape), name
+        assert name in clocks or mine.tobytes() == values.tobytes(), name
+    assert (here.flags.tobytes(), list(here.tier)) == (there.flags.tobytes(), list(there.tier))
+    assert here["total_us"].all() and here.warnings == there.warnings
+
+
+def test_a_series_in_process_names_the_frame_that_is_refused(pressure_pa):
+    frames = np.repeat(pressure_pa[None], 40, axis=0)
+    frames[29] *= 100
+    told = []
+    with pytest.raises(papilla.FrameFailed, match="frame 29") as failed:
+        terms = {"tier": "nano", "out_of_range": "refuse", "lanes": 1}
+        papilla.render(frames, url="local", progress=lambda *done: told.append(done), **terms)
+    assert failed.value.frame == 29 and told[-1][1] == 40 and 20 < told[-1][0] < 30
+    with papilla.local(tier="nano") as session:
+        assert session.series(frames).flagged("out_of_range") == 1
+        assert any("beyond" in words or "range" in words for words in session.warnings), session.warnings

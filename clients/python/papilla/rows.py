@@ -1,0 +1,116 @@
+"""Answers of a series that is rendered in process: parts of their messages as rows of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import wire
+from .answer import ErrorEstimate, Summary, Touch
+from .series import Array, Series
+from .wire import SIDE_PX
+
+_MAP_BYTES: Final = 4 * SIDE_PX**2
+# Sections of float32, and what a series calls them.
+_FLOATS: Final = {
+    "pressure": "pressure_pa",
+    "shear": "shear_pa",
+    "displacement": "displacement_mm",
+    "points": "points_j_per_m3",
+    "point_rates": "point_rates_hz",
+    "actuators": "actuators",
+}
+_RATES_HEAD: Final = "head of the rates"
+
+
+class Rows:
+    """A row for each frame, of the header and of each section; read once all are there."""
+
+    def __init__(self, count: int, ready: dict[str, Any]) -> None:
+        self._ready = ready
+        self._heads = np.zeros(count, wire.HEAD)
+        self._offsets: dict[str, int] = {}
+        self._rows: dict[str, NDArray[np.uint8]] = {}
+        for section in ready["sections"]:
+            name, offset, size = section["name"], section["offset"], section["bytes"]
+            if name == "rates":
+                self._room(_RATES_HEAD, offset, wire.RATES_HEAD, count)
+                offset, size = offset + wire.RATES_HEAD, size - wire.RATES_HEAD
+            self._room(name, offset, size, count)
+
+    def _room(self, name: str, offset: int, size: int, count: int) -> None:
+        self._offsets[name], self._rows[name] = offset, np.empty((count, size), np.uint8)
+
+    @staticmethod
+    def fit(ready: dict[str, Any]) -> bool:
+        """Whether each answer of a session has the same numbers at the same places."""
+        is_windowed = "contact_window" in ready["session_effects"]
+        return not is_windowed and all(section["name"] != "spikes" for section in ready["sections"])
+
+    def rooms(self, first: int, count: int) -> list[list[tuple[int, NDArray[np.uint8]]]]:
+        """For each of `count` frames: places in the message of its answer, and where what begins there goes."""
+        heads = self._heads.view(np.uint8).reshape(-1, wire.HEAD.itemsize)
+        offsets = [0, *(self._offsets[name] for name in self._rows)]
+        columns = [rows[first : first + count] for rows in (heads, *self._rows.values())]
+        return [list(zip(offsets, rows, strict=True)) for rows in zip(*columns, strict=True)]
+
+    def has_flag(self, name: str, first: int, count: int) -> bool:
+        """Whether an answer has a flag."""
+        bit = next(bit for bit, own in wire.FLAGS.items() if own == name)
+        return bool((self._heads["flags"][first : first + count] & bit).any())
+
+    def series(self, tier: str, times_s: NDArray[np.float64] | None, warnings: Sequence[str], seconds: float) -> Series:
+        """All of it."""
+        tiers, flags = np.full(len(self._heads), tier), self._heads["flags"].copy()
+        return Series(times_s, self._values(), flags, tiers, self._ready, None, warnings, seconds)
+
+    def _values(self) -> dict[str, Array]:
+        rows, heads = self._rows, self._heads
+        found: dict[str, Array] = {}
+        if "vertices" in rows:
+            found["sed_j_per_m3"] = self._scaled("vertices", heads["scale"])[:, : self._ready["vertices"]]
+        elif "map" in rows:
+            found["sed_j_per_m3"] = _square(self._scaled("map", heads["scale"]))
+        if "rates" in rows:
+            found["rates_hz"] = _square(self._scaled("rates", rows[_RATES_HEAD][:, :4].view("<f4")[:, 0]))
+        for section, name in _FLOATS.items():
+            if section in rows:
+                values = rows[section].view("<f4")
+                if section in ("shear", "displacement"):
+                    values = values.reshape(len(heads), -1, 3)
+                found[name] = _square(values) if section == "pressure" else values
+        if "touch" in rows:
+            found |= _touch(rows["touch"].view("<f4").astype(np.float64))
+        for section, kind in (("summary", Summary), ("error_estimate", ErrorEstimate)):
+            if section in rows:
+                start = "error" if section == "error_estimate" else section
+                columns = rows[section].view("<f4").astype(np.float64).T.copy()
+                found |= {f"{start}_{name}": column for name, column in zip(kind._fields, columns, strict=True)}
+        for name in ("total_us", "queue_us", "infer_us"):
+            found[name] = heads[name].astype(np.int64)
+        return found
+
+    def _scaled(self, section: str, scale: NDArray[np.float32]) -> NDArray[np.float32]:
+        return wire.scaled_rows(self._rows[section], self._ready["answer_sample_type"], scale)
+
+
+def _square(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Maps as such; values at vertices as they are."""
+    return values.reshape(-1, SIDE_PX, SIDE_PX) if 4 * values.shape[1] == _MAP_BYTES else values
+
+
+def _touch(numbers: NDArray[np.float64]) -> dict[str, Array]:
+    """The members of `Touch`, of the numbers in its section."""
+    found: dict[str, Array] = {}
+    at = 0
+    for name in Touch._fields:
+        if name in ("force_n", "torque_n_mm", "centre_mm"):
+            found[f"touch_{name}"] = numbers[:, at : at + 3].copy()
+            at += 3
+        else:
+            found[f"touch_{name}"] = numbers[:, at].copy()
+            at += 1
+    return found
