@@ -92,7 +92,7 @@ def picture(path, atlas, depth_m, touched):
     # The pad from below: what faces the ball.
     x, y, z = atlas.positions_mm.T
     below = atlas.triangles[(z[atlas.triangles] < -1).all(axis=1)]
-    drawn, (left, right) = pyplot.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+    drawn, (left, right) = pyplot.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
     # Titles and labels keep clear of the picture's edge.
     drawn.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
     for axes, values, title, unit in (
