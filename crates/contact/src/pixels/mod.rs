@@ -33,6 +33,7 @@
 //! pixels leave a gap for the difference between their own pressure and that of the vertices, less
 //! and less towards the inside.
 
+mod careful;
 mod convolution;
 
 mod memory;
@@ -57,6 +58,7 @@ use crate::model::ContactModel;
 use crate::object::Object;
 use crate::second_order::Amplitudes;
 use crate::solver::{Solver, Until};
+use careful::Careful;
 use convolution::Convolution;
 use papilla_atlas::MAP_LEN;
 use rubbing::Rubbing;
@@ -91,6 +93,7 @@ pub struct PixelContact {
     convolution: Convolution,
     amplitudes: Option<Amplitudes>,
     turns: Turns,
+    careful: Careful,
     rubbing: Rubbing,
     /// By pixel of the window: gap, mm, and pressure, MPa.
     rest: Vec<f32>,
@@ -172,6 +175,7 @@ impl PixelContact {
             convolution: Convolution::new(Arc::clone(&skin.plans)),
             amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
             turns: Turns::new(model.vertices()),
+            careful: Careful::new(model.vertices(), pixels),
             rubbing: Rubbing::new(model.vertices()),
             rest: vec![0.0; pixels],
             of_vertices: vec![0.0; pixels],

@@ -13,6 +13,9 @@ const ROUNDS_MAX: usize = 24;
 const SETTLED: f32 = 0.01;
 /// The same, above which an answer is not settled.
 const UNSETTLED: f32 = 0.03;
+/// Careful rounds at most after these, and their work that ends them, in units.
+const CAREFUL_MAX: usize = 60;
+const CAREFUL_WORK: u64 = 400_000_000;
 /// Violation of a complementarity condition that is accepted, reference mm.
 const VIOLATION_MM: f32 = 1e-4;
 /// Most products with the compliance in a round.
@@ -87,12 +90,40 @@ impl PixelContact {
         let mut change = f32::INFINITY;
         for round in 0..ROUNDS_MAX {
             let start = (round == 0).then_some(warm);
-            change = self.round(solver, view, start, effort).ok().filter(|c| c.is_finite())?;
+            self.round(solver, view, start, effort).ok()?;
+            change = Some(self.turns.take(&mut self.window.force_n)).filter(|c| c.is_finite())?;
             if change <= SETTLED || view.is_spent(effort) {
+                return Some(change);
+            }
+        }
+        if change <= UNSETTLED { Some(change) } else { self.careful_rounds(solver, view, effort) }
+    }
+
+    /// Rounds that go on from the best of them.
+    fn careful_rounds(
+        &mut self,
+        solver: &Solver,
+        view: View<'_>,
+        effort: &mut Effort,
+    ) -> Option<f32> {
+        let m = self.window.free();
+        let (mut change, began) = (f32::INFINITY, effort.work);
+        self.careful.begin(&self.pressure[..m]);
+        for round in 0..CAREFUL_MAX {
+            if round > 0 {
+                let Self { careful, turns, window, pressure, .. } = self;
+                careful.go_on(turns.active(), &mut window.force_n, &mut pressure[..m]);
+            }
+            self.round(solver, view, None, effort).ok()?;
+            let Self { careful, turns, window, pressure, .. } = self;
+            let forces = [&window.force_n, turns.answered()];
+            change = careful.note(turns.active(), forces, &pressure[..m]);
+            if !(change > UNSETTLED) || view.is_spent(effort) || effort.work - began > CAREFUL_WORK
+            {
                 break;
             }
         }
-        Some(change)
+        Some(change).filter(|change| change.is_finite())
     }
 
     /// What vertices found stands where their forces push skin out of reach in every round.
@@ -119,15 +150,15 @@ impl PixelContact {
         }
     }
 
-    /// Vertices, then pixels; returns the change of the vertices' forces over their sum. The first
-    /// round starts from the last frame's pressure if `start` says so, else from the vertices'.
+    /// Vertices, then pixels, and the sums of their pressure. The first round starts from the last
+    /// frame's pressure if `start` says so, else from the vertices'.
     fn round(
         &mut self,
         solver: &Solver,
         view: View<'_>,
         start: Option<bool>,
         effort: &mut Effort,
-    ) -> Result<f32, ContactError> {
+    ) -> Result<(), ContactError> {
         let model = &solver.model;
         let Self { skin, window, amplitudes, turns, pressure, of_vertices, .. } = self;
         window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
@@ -162,7 +193,7 @@ impl PixelContact {
             effort.iterations += 1;
             window.sum_forces(skin, &pressure[..n], turns.found());
             rubbing.sum_forces(skin, window, &pressure[..n]);
-            return Ok(turns.take(&mut window.force_n));
+            return Ok(());
         }
         let gradient = &mut rest[..m];
         window.gradient([&pressure[..m], &of_vertices[..m]], gradient);
@@ -183,6 +214,6 @@ impl PixelContact {
         effort.iterations += 1;
         window.sum_forces(skin, &pressure[..n], turns.found());
         rubbing.sum_forces(skin, window, &pressure[..n]);
-        Ok(turns.take(&mut window.force_n))
+        Ok(())
     }
 }

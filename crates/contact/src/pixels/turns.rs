@@ -85,6 +85,11 @@ impl Turns {
         &self.found
     }
 
+    /// Vertices, in their order, that can have a force in this frame.
+    pub(super) fn active(&self) -> &[u32] {
+        &self.active
+    }
+
     /// Whether the next frame starts from this one.
     pub(super) fn is_warm(&self) -> bool {
         self.warm

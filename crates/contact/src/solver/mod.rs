@@ -291,9 +291,8 @@ impl Solver {
 
     /// Ends a frame of things in given places: force that has fallen on a straight way in is told.
     pub(crate) fn end_frame(&mut self, view: View<'_>, out: &mut Contact) {
-        let has_faded = self.sides.has_faded(out.force_n);
-        out.quality.has_faded = out.quality.settled && has_faded;
-        out.quality.settled &= !has_faded;
+        out.quality.has_faded = self.sides.has_faded(out.force_n, out.quality.settled);
+        out.quality.settled &= !out.quality.has_faded;
         self.follow_slip(view);
     }
 

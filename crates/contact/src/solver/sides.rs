@@ -44,6 +44,8 @@ const SLANT: f64 = 0.7;
 const FADE: f64 = 0.05;
 const FADE_N: f64 = 8e-3;
 const ASIDE: f64 = 0.4;
+/// Farther in one frame an object was not followed on its way in, mm.
+const FOLLOWED_MM: f64 = 2.0;
 /// How many times as deep on its way as its nearest surface tells a narrow body is.
 const NARROW: f64 = 2.0;
 /// Beyond what a ray has to lie before a vertex counts as passed, mm.
@@ -154,10 +156,20 @@ impl Sides {
         sides.iter().all(fits)
     }
 
-    /// Whether the force `force_n` of the only object has fallen on a straight way in.
-    pub(super) fn has_faded(&mut self, force_n: [f64; 3]) -> bool {
+    /// Whether the force `force_n` of the only object has fallen on a straight way in. One that has not
+    /// settled tells nothing, neither now nor later.
+    pub(super) fn has_faded(&mut self, force_n: [f64; 3], is_settled: bool) -> bool {
         let [side] = &mut self.now[..] else { return false };
-        let past = self.kept.first().and_then(|past| past.hardest);
+        let last = self.kept.first().copied().unwrap_or_default();
+        let is_followed = |place: [f64; 3]| {
+            let by = |was: [f64; 3]| (0..3).map(|i| (place[i] - was[i]).powi(2)).sum::<f64>();
+            last.origin_mm.is_some_and(|was| by(was) <= FOLLOWED_MM * FOLLOWED_MM)
+        };
+        let past = last.hardest.filter(|_| side.origin_mm.is_some_and(is_followed));
+        if !is_settled {
+            side.hardest = past;
+            return false;
+        }
         let (Some(way), Some(place)) = (side.way, side.origin_mm) else { return false };
         let force = -dot(force_n, way);
         let Some([x, y, z, hardest]) = past else {
