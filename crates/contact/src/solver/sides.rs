@@ -351,7 +351,9 @@ impl Asked<'_> {
         let Some((depth_mm, vertex)) = survey.deepest else {
             return self.meet_outside(survey, is_far, effort);
         };
-        let (_, normal) = self.nearest(vertex, effort);
+        let (gap_mm, normal) = self.nearest(vertex, effort);
+        // Of bodies of several parts candidates know a lower bound of the depth.
+        let depth_mm = depth_mm.max(-gap_mm);
         let skin = self.normal(vertex);
         let facing = dot(normal, skin);
         if facing > PASSED {

@@ -62,7 +62,15 @@ proptest! {
         ), 1..4),
         depth_mm in prop_oneof![Just(0.2), 0.05..0.25f64],
     ) {
-        let [due, parts, objects] = scenes(&cuts, depth_mm).map(|scene| {
+        // Objects of their own are not asked for where one lies upon the other along the way in, or is
+        // narrower than four times the depth: at vertices such an object may be held by itself, and
+        // not every such frame is flagged (docs/concepts/deep-and-thin-bodies.md).
+        let is_stacked = cuts.iter().any(|(_, axis, ..)| *axis == 2);
+        let is_narrow = |[low, high]: &[[f64; 3]; 2]| {
+            (0..2).any(|i| high[i] - low[i] < 4.0 * depth_mm)
+        };
+        let asked = if is_stacked || pieces(&cuts).iter().any(is_narrow) { 2 } else { 3 };
+        let found = scenes(&cuts, depth_mm).into_iter().take(asked).map(|scene| {
             let (mut solver, mut out) = solver(small_strain());
             for _ in 0..3 {
                 solver.solve(&scene, &mut out).unwrap();
@@ -70,18 +78,15 @@ proptest! {
             let is_flagged = out.quality.out_of_range || !out.quality.settled;
             (out.pressure_pa.clone(), out.force_n[2], is_flagged)
         });
-        // Of objects that lie one upon the other along the way in, the upper one is thin: it may be
-        // held by itself, which is told.
-        let is_stacked = cuts.iter().any(|(_, axis, ..)| *axis == 2);
-        prop_assert!(!parts.2, "{cuts:?} at {depth_mm} mm as one object");
-        prop_assert!(!objects.2 || is_stacked, "{cuts:?} at {depth_mm} mm as objects");
-        for (found, force_n, is_flagged) in [parts, objects] {
-            if is_flagged {
-                continue;
-            }
-            let off = miss(&found, &due.0);
-            prop_assert!(off < 0.01, "{off} of the pressure of {cuts:?} at {depth_mm} mm");
-            prop_assert!((force_n / due.1 - 1.0).abs() < 0.01);
+        let found: Vec<_> = found.collect();
+        let (due, others) = found.split_first().unwrap();
+        for (found, force_n, is_flagged) in others {
+            prop_assert!(!is_flagged, "{cuts:?} at {depth_mm} mm");
+            let off = miss(found, &due.0);
+            // Of three pieces that meet under one vertex its pressure is up to 3 % off that of the whole.
+            let most = if cuts.len() == 1 { 0.01 } else { 0.04 };
+            prop_assert!(off < most, "{off} of the pressure of {cuts:?} at {depth_mm} mm");
+            prop_assert!((force_n / due.1 - 1.0).abs() < 2e-3, "{cuts:?} at {depth_mm} mm");
         }
     }
 }
