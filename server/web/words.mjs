@@ -6,7 +6,7 @@ import { suits } from './tiers.mjs';
 const SETS = {
   reference: ['finest mesh', 'the only set that finite elements on coarser meshes were held against'],
   'reference-anew': ['finest mesh again', 'other poses, solved when everything was decided'],
-  'reference-shapes': ['finest mesh, new shapes', 'shapes that no other set has, solved when everything was decided'],
+  'reference-shapes': ['fresh shapes', 'on the finest mesh: shapes that no other set has, solved when everything was decided'],
   'heldout-presses': ['new presses', 'of shapes that were trained on; for maps of pressure the service chooses by these'],
   'heldout-shapes': ['new shapes', 'never trained on'],
   pressed: ['hard presses', 'a plate to 7 N, a key, gratings, Braille'],
