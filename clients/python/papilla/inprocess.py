@@ -21,6 +21,7 @@ from .calls import Calls
 from .errors import Closed, Refused
 from .link import Warned, questions, told_beyond, told_refused
 from .model import Model
+from .rows import Rooms
 from .wire import NetForce, Window
 
 # No service reads them, so they mean nothing here: what a session does when its connection breaks.
@@ -186,14 +187,14 @@ class LocalSession(Calls):
         kind: str,
         frames: Sequence[NDArray[np.float32]],
         times_us: Sequence[int],
-        rooms: Sequence[list[tuple[int, NDArray[np.uint8]]]],
+        rooms: Sequence[Rooms],
     ) -> tuple[int, Problem] | None:
         """Renders frames of the hello's `input`, one after the other, and writes parts of their answers.
 
         `rooms` has for each frame places in the message of its answer, and a room of as many bytes as go there.
         Frames are not looked at. Gives the number of the frame that is refused, which ends it, and why.
         """
-        sent: list[tuple[bytes, bytes | memoryview, list[tuple[int, NDArray[np.uint8]]]]] = []
+        sent: list[tuple[bytes, bytes | memoryview, Rooms]] = []
         with self._lock:
             for values, at_us, own in zip(frames, times_us, rooms, strict=True):
                 rows = np.atleast_2d(values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from .answer import ErrorEstimate, Summary, Touch
 from .series import Array, Series
 from .wire import SIDE_PX
 
+Rooms: TypeAlias = list[tuple[int, NDArray[np.uint8]]]
+"""Places in the message of an answer, and where what begins there goes."""
 _MAP_BYTES: Final = 4 * SIDE_PX**2
 # Sections of float32, and what a series calls them.
 _FLOATS: Final = {
@@ -50,8 +52,8 @@ class Rows:
         is_windowed = "contact_window" in ready["session_effects"]
         return not is_windowed and all(section["name"] != "spikes" for section in ready["sections"])
 
-    def rooms(self, first: int, count: int) -> list[list[tuple[int, NDArray[np.uint8]]]]:
-        """For each of `count` frames: places in the message of its answer, and where what begins there goes."""
+    def rooms(self, first: int, count: int) -> list[Rooms]:
+        """Those of each of `count` frames."""
         heads = self._heads.view(np.uint8).reshape(-1, wire.HEAD.itemsize)
         offsets = [0, *(self._offsets[name] for name in self._rows)]
         columns = [rows[first : first + count] for rows in (heads, *self._rows.values())]

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import check
 from .answer import Answer, Problem
 from .errors import BadInput, FrameFailed
-from .rows import Rows
+from .rows import Rooms, Rows
 from .series import Columns, Series, joined
 from .wire import SIDE_PX, Window
 
@@ -66,7 +66,7 @@ class InProcess(Protocol):
         kind: str,
         frames: Sequence[NDArray[np.float32]],
         times_us: Sequence[int],
-        rooms: Sequence[list[tuple[int, NDArray[np.uint8]]]],
+        rooms: Sequence[Rooms],
     ) -> tuple[int, Problem] | None: ...
 
     def warn_beyond(self) -> None: ...
