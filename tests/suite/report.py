@@ -15,9 +15,11 @@ RECORD = Path("docs/reports/tests.json")
 PAGE = Path("docs/reports/tests.md")
 INTRODUCTION = """# Tests: when each part last ran
 
-Written by `./test --record` (`--fast`, `--all`), which notes every part that it ran; what each is
-and what only the long form does says [testing](../guides/testing.md). Processor seconds count
-all processes of a part.
+`./test --record` writes this page, also together with `--fast` or `--all`. It notes each part that
+it ran, and leaves all other rows as they are. A row tells how the part ended at the named commit. A
+part that failed there may work again since then: `git log docs/reports/tests.md` says so if it is
+known. [Testing](../guides/testing.md) explains the options. Processor seconds count all processes of
+a part.
 
 | part | of | last run | commit | processor | outcome | tests | wall, s | processor, s |
 |---|---|---|---|---|---|---|---|---|
