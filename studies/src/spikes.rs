@@ -13,12 +13,19 @@ use std::time::Instant;
 const HEAD: &str = "\
 # Spikes of touch units
 
-**Question.** Do the nerve fibres of the effect `afferents` fire as those of TouchSim, whose model neurons they are, and
-do they fire the same if they are driven by strain energy density (SED) instead of a pin? What does a frame cost?
+**Question.** TouchSim is a published model of the nerve fibres of touch, in which a pin drives the fibres (Saal, Delhaye,
+Rayhaun & Bensmaia 2017). The session effect [`spikes`](../../docs/reference/protocol-effects.md#spikes) has the same
+model neurons. Do they fire as those of TouchSim? Do they fire the same if strain energy density (SED) drives them in
+place of a pin? And what does a frame cost? The [glossary](../../docs/glossary.md) explains terms.
 
-**Method.** The first table repeats TouchSim's own tests, which hold to one spike and 0.25 ms (`tests/test_timing.py` of
-github.com/hsaal/touchsim; Saal, Delhaye, Rayhaun & Bensmaia 2017): the first neuron of each class under a pin that
-moves for a second. SA1 are slowly adapting, RA rapidly adapting and PC Pacinian fibres. The command writes this page:
+**What it means.** Under the same pin the neurons fire as those of TouchSim. Driven by SED, each neuron fires as often,
+and 0.2 ms later. This holds for the effect alone. Whether SED on a finger makes fibres fire as people's do is another
+question: the stress at which they begin to fire was not fitted to people.
+
+**Method.** The first table repeats TouchSim's own tests (`tests/test_timing.py` of github.com/hsaal/touchsim): the first
+neuron of each class under a pin that moves for a second. TouchSim's tests allow a difference of one spike, and of 0.25
+ms in the time of the first spike; *ok* means that this holds here too. SA1 are slowly adapting, RA rapidly adapting and
+PC Pacinian fibres. The command writes this page:
 
 ```sh
 cargo run --release -p papilla-studies -- spikes
@@ -26,7 +33,7 @@ cargo run --release -p papilla-studies -- spikes
 
 ## Against TouchSim
 
-| class | movement of the pin | radius, mm | distance of the neuron, mm | spikes | of TouchSim | first spike, ms | of TouchSim | |
+| class | movement of the pin | radius, mm | distance of the neuron, mm | spikes here | spikes in TouchSim | first spike here, ms | first spike in TouchSim, ms | within the tolerance? |
 |---|---|---|---|---|---|---|---|---|
 ";
 
@@ -42,16 +49,19 @@ neuron under the pin in TouchSim. PC units take force and not SED.
 ";
 
 const AFTER: &str = "
-Driven by SED, each neuron fires as often as under the pin, and 0.2 ms later. The threshold (`e_ref_kpa`) is not fitted
-to people. At the default 80 kPa a stress below some 8 kPa, which is 400 J/m3, leaves SA1 silent. Under a plate at 0.9 N,
-whose SED is 340 J/m3 at most (network `large`), only a few of 470 units fire.
+The effect takes the stress `sqrt(2 e_ref SED)` from SED, with the modulus `e_ref_kpa`. At its default of 80 kPa, SA1
+units do not fire below a stress of some 8 kPa, which is an SED of 400 J/m3. The modulus was not fitted to people. Under
+a plate with 0.9 N, SED is 340 J/m3 at most (by the network `large` of 23 November 2026), and only a few of the 470 SA1
+units of the default finger fire.
 ";
 
 const COST: &str = "
 ## Time of a frame
 
-A plane interface of 6.7 cm2 at the densities of a fingertip. SED and force go up and down seven times a second. Times
-are medians of 400 frames and cover membranes, places of SED and waves.
+A plane of 6.7 cm2 carries units of all three classes at the densities of a fingertip. SED and force go up and down seven
+times a second, on a disc of 77 mm2 or everywhere. Times are medians of 400 frames. They cover the steps of the neurons,
+the reading of SED at their places, and the waves along the skin that drive PC units. A frame at 90 Hz covers 11 times
+as many steps as one at 1000 Hz. *Noise* is the option of random fluctuations, with which no neuron may be left out.
 
 | SED on | noise | frames a second | units | spikes a second | time of a frame, us |
 |---|---|---|---|---|---|
