@@ -334,7 +334,7 @@ itself, so all errors contain that of the network. The row *true pressure* has t
 | force | error of the integral of pressure over the undeformed skin |
 | SA1 | error of the sum of the rates of all SA1 afferents under a constant stress, by the formula of the effect [`afferents`](../../docs/reference/protocol-effects.md#afferents) |
 
-This command writes the page, beside a running `papilla-server`. It was written on {date}, on {machine}.
+This command writes the page, beside a running `papilla-server`, in some ten minutes on two busy cores. It was written on {date}, on {machine}.
 
 ```sh
 python studies/sensors.py measure
