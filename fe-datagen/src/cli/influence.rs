@@ -17,11 +17,11 @@ use std::process::ExitCode;
 /// vertex_weight [V, M], which average them to the vertices, g [V, 6, V] and
 /// area_mm2 [V]) and a card (operator.json: atlas hash,
 /// materials, checks, seconds). One factorization, V right-hand sides; layers on, rigid
-/// bone and nail. See docs/concepts/networks.md.
+/// bone and nail. See docs/reference/operator.md.
 #[derive(clap::Args)]
 #[command(
     after_help = "SED of face f, J/m3: sum_k (sum_j face_g[f, k, j] p_j)^2 with p in Pa; a vertex has its faces' mean.\n\
-                        Takes 14 s and 1.5 GB at density medium, a second at coarse.\n\
+                        Takes some 12 s and 0.6 GiB at density medium, a second at coarse.\n\
                         Example: fe-datagen operator --density coarse --out out/operator"
 )]
 pub(super) struct Args {
