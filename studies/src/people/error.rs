@@ -39,8 +39,8 @@ pub enum PeopleError {
     },
     /// An indenter goes as deep as it may and has not met its force.
     #[error(
-        "{press}: {wanted_n} N is not reached: {reached_n:.3} N at {depth_mm:.2} mm{}. Take a smaller \
-         force or a larger indenter",
+        "{press}: the force ends at {reached_n:.3} N, {depth_mm:.2} mm deep{}, short of {wanted_n} N. \
+         Take a smaller force or a larger indenter",
         why.as_deref().map(|w| format!(" ({w})")).unwrap_or_default()
     )]
     Force {

@@ -128,7 +128,7 @@ mod tests {
         let wanted = Quantity::Stiffness { force_n: 10.0, pitch_deg: 0.0 };
         let subject = Materials::NeoHookean.subject();
         let error = figure(&wanted, &subject, &hertz()).unwrap_err().to_string();
-        assert!(error.contains("10 N is not reached") && error.contains("3.00 mm"), "{error}");
+        assert!(error.contains("short of 10 N") && error.contains("3.00 mm"), "{error}");
     }
 
     #[test]

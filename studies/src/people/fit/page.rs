@@ -108,17 +108,19 @@ impl Fit {
             let held: Vec<String> = self.held.iter().map(held).collect();
             let _ = write!(text, "\nNot moved: {}.\n", held.join("; "));
         }
+        let graded = match self.graded {
+            0 => "none on the graded mesh".to_owned(),
+            count => format!("{count} on the graded mesh in {:.0} s", self.solve_s[1]),
+        };
         let _ = write!(
             text,
             "\n![How far each constant can be moved]({PICTURES}/profiles.svg)\n\nHalf the sum of the \
              squared residuals falls from {:.3} to {:.3}. {} fingers were simulated on the even mesh in \
-             {:.0} s of processor time, and {} on the graded mesh in {:.0} s.\n",
+             {:.0} s of processor time, and {graded}.\n",
             self.cost[0],
             self.cost[1],
             self.evaluated.len(),
-            self.solve_s[0],
-            self.graded,
-            self.solve_s[1]
+            self.solve_s[0]
         );
     }
 

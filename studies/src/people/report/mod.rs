@@ -194,7 +194,7 @@ impl Report {
         for p in &fit.peaks {
             let peak = format!(
                 "SA1 from SED at the interface: peak of the profile under {} 1/m, distance from \
-                 people's at {} mm, mm",
+                 the measured one at {} mm, mm",
                 p.curvature_per_m, p.people_mm
             );
             let away = (p.here_mm - p.people_mm).abs();

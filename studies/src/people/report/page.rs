@@ -43,8 +43,8 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "{}{}. {}. Spheres on the mesh `{}`, plates on `coarse`, both \
-             [graded](../../docs/reference/scenes.md#geometry), unless the table above names the even one.\n\n## Rows\n\n| quantity | the model | measured | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
+            "{}Computed on {}. {}. Spheres are pressed on the mesh `{}`, plates on `coarse`. Both are \
+             [graded](../../docs/reference/scenes.md#geometry), unless the table above names the even mesh.\n\n## Rows\n\n| quantity | the model | measured | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
             HEAD.replace("DENSITY", density(self.density)),
             self.made,
             self.finger_text(),
@@ -77,8 +77,11 @@ impl Report {
 
     fn finger_text(&self) -> String {
         match &self.finger {
-            Some(name) => format!("Finger: {name}, {} law", self.materials.law()),
-            None => format!("The default finger. Materials: {}", self.materials.name()),
+            Some(name) => format!("The finger is {name}; its law is {}", self.materials.law()),
+            None => format!(
+                "The finger is the default one; its materials are {}",
+                self.materials.name()
+            ),
         }
     }
 

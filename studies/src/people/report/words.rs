@@ -19,7 +19,7 @@ pub(crate) fn quantity(quantity: &Quantity) -> String {
             format!("stiffness at {to_n} N over that at {from_n} N, {}", plate(pitch_deg))
         }
         Quantity::Exponential { to_n, pitch_deg } => {
-            format!("R2 of an exponential force to {to_n} N, {}", plate(pitch_deg))
+            format!("R2 of a line through stiffness over force, to {to_n} N, {}", plate(pitch_deg))
         }
         Quantity::RelaxationTime { rank } => format!("relaxation time {rank}, s"),
         Quantity::PeakOverMean { force_n, pitch_deg } => {
