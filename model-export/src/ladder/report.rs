@@ -84,10 +84,11 @@ fn readings(text: &mut String, found: &Readings) {
         text,
         "## What a pressure map is worth\n\n\
          Each of {} states of the reference was solved on two meshes, its own and `{}`, which gives two pressure\n\
-         maps of the same state. A network can only know the map that it is given. So the difference between its answers to\n\
-         the two maps is a part of its error that no training can take away. The table compares the two pressure maps, and\n\
-         each network's two answers. Smoothing takes away half of the difference of the pressure maps: so half of it is in\n\
-         detail finer than some 0.1 mm.\n\n\
+         maps of the same state. The table compares the two pressure maps, and each network's two answers.\n\
+         A network can only know the map that it is given. If it answered one of the two exactly, it would err with the other\n\
+         by about the difference between its two answers. Training could lessen only what is systematic in this difference,\n\
+         which was not tried. Smoothing takes away half of the difference of the pressure maps: so half of it is in detail\n\
+         finer than some 0.1 mm.\n\n\
          | relative L2 between the two | median | p95 |\n|---|---|---|\n",
         found.states, found.mesh
     );
