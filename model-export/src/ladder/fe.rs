@@ -27,8 +27,8 @@ pub(super) fn reference_error(rungs: &[Rung], set: &str) -> Option<Discretisatio
     Some(Discretisation {
         sed_relative_l2: errors.relative_l2.median / (SPACING_RATIO.powi(2) - 1.0),
         how: format!(
-            "Richardson's extrapolation from {NEXT_FINEST} over {} states, as the square of the \
-             spacing; the same family of meshes",
+            "Richardson's extrapolation from {NEXT_FINEST} over {} states. The two meshes are of one \
+             family, and the error is taken to fall as the square of the spacing of nodes",
             errors.samples
         ),
     })

@@ -22,7 +22,7 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
     if let Some(floor) = &ladder.discretisation_error {
         let _ = writeln!(
             text,
-            "The SED of the reference itself errs by about {} (relative L2 norm). How this was estimated: {}\n\
+            "The SED of the reference itself errs by about {} (relative L2 norm). This was estimated by {}\n\
              ([more](../concepts/accuracy.md#two-truths)). On the sets whose truth is the reference, smaller differences between\n\
              ways mean nothing. On all others a smaller difference says which way is nearer to the teacher, and not which is\n\
              nearer to the truth.\n",
@@ -106,7 +106,7 @@ fn readings(text: &mut String, found: &Readings) {
 
 fn costs(text: &mut String, ladder: &Ladder) {
     text.push_str(
-        "## Time and size\n\nA way is in bold if its error is smaller than that of every faster way in bold",
+        "## Time and size\n\nFrom fast to slow, a way is in bold if it is more accurate than all ways in bold before it",
     );
     if let Some(set) = &ladder.pareto_set {
         let _ = write!(text, " (median relative L2 on {set}");
@@ -114,7 +114,7 @@ fn costs(text: &mut String, ladder: &Ladder) {
         if apart > 0.0 {
             let _ = write!(
                 text,
-                "; smaller by at least {:.1} percentage points, which is the error of the reference itself",
+                "; better by at least {:.1} percentage points, which is the error of the reference itself",
                 100.0 * apart
             );
         }
@@ -221,8 +221,8 @@ fn zone(text: &mut String, stem: &str) {
          The zone is the interface from {:.0} to {:.0} mm behind the tip (x in the undeformed finger's frame). The nail plate\n\
          of the default fingertip ends at 14 mm, so the zone reaches 2 mm to either side of that edge. It holds the nail's\n\
          matrix and fold. An object that presses the pad rarely touches the skin here, but it loads this zone through the\n\
-         tissue. The U-Net paper reports that its network misses the SED there. Any network has to miss it, of which each pixel\n\
-         of the answer depends on no more than the pressure within 2 to 3 mm.\n",
+         tissue. The U-Net paper reports that its network misses the SED there. A network has to miss it if each pixel of\n\
+         its answer depends only on the pressure within 2 to 3 mm.\n",
         NAIL_BASE_MM.start, NAIL_BASE_MM.end
     );
 }

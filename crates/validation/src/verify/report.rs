@@ -75,7 +75,7 @@ Of each case this table has one comparison: the one that uses up most of its tol
 |---|---|
 | comparison | what is compared |
 | this code, truth | the two numbers. Some numbers only have to stay below a bound; then the bound stands as the truth |
-| difference | computed from all digits, relative to the truth. It is absolute if the truth is zero, and for orders of convergence. For a bound it is 0 as long as the bound is kept; how near the number is to it show the two columns before |
+| difference | computed from all digits, relative to the truth. It is absolute if the truth is zero, and for orders of convergence. For a bound it is 0 as long as the bound is kept; the two columns before show how near the number is to it |
 | allowed | the tolerance, or `bound` |
 
 | case | comparison | this code | truth | source of the truth | difference | allowed |

@@ -96,8 +96,10 @@ impl ScenesReport {
         let mut out = format!(
             "# Random scenes\n\n\
              **Question.** Does every random scene converge and balance ([method and \
-             command](stability.md#random-scenes))?\nThese scenes: {of} (`--scenes {scenes} --seed {}`).\n\n\
-             | | as they end now | when first run: the {counted} for which nothing had been changed |\n\
+             command](stability.md#random-scenes))?\nThe [glossary](../glossary.md) explains terms. \
+             These scenes: {of} (`--scenes {scenes} --seed {}`).\n\n\
+             | | last run of each scene | first run, of the {counted} scenes with which the solver was not \
+             improved |\n\
              |---|---|---|\n| scenes | {scenes} | {counted} |\n\
              | converged, every balance kept | {} | {} |\n",
             of.seed, now.balanced, first_run.balanced
@@ -105,31 +107,35 @@ impl ScenesReport {
         for ((what, now), (_, first)) in now.lists().into_iter().zip(first_run.lists()) {
             let _ = writeln!(out, "| {what} | {} | {} |", now.len(), first.len());
         }
-        let verdict = if self.passed() { "met" } else { "**not met**" };
+        let verdict = if self.passed() { "meet" } else { "**do not meet**" };
         let _ = write!(
             out,
-            "\nThe criterion is {verdict} now: 99.9 % converge, each of them balances, and nothing \
-             panics. At 95 %\nconfidence at most **{:.3} %** of all scenes drawn like these fail when \
-             first run (bound of Clopper and\nPearson for {} among {counted}, which takes the scenes for \
-             independent).\n",
+            "\nThe last runs {verdict} the criterion: 99.9 % converge, each of these balances, and nothing \
+             panics. Of all scenes\nthat are drawn in this way, at most **{:.3} %** fail in their first \
+             run, at 95 % confidence (bound of Clopper and\nPearson for a count of {} among {counted}, which takes the \
+             scenes for independent).\n",
             100.0 * self.failing_at_most,
             first_run.failed(),
         );
         if let Some(MendedOn { scenes, failed }) = of.mended_on {
             let _ = writeln!(
                 out,
-                "The first {scenes} do not count: {failed} of them failed, and the solver was changed on \
-                 them. Their first\nrecords are lost."
+                "The first {scenes} scenes do not count: {failed} of them failed, and the solver was improved with \
+                 their help. Their\nfirst records are lost."
             );
         }
-        let _ = write!(
-            out,
-            "\nThe record names version, contact rule and attempts of {} of {scenes} scenes; {} of these \
-             took more than\none attempt.\n\n\
-             Iterations are those of Newton's method on the path that was kept. Times are processor \
-             times of all paths\nof a scene.\n\n",
-            self.recorded, self.retried
-        );
+        let _ = match self.recorded {
+            0 => writeln!(out, "\nHow often a scene was solved anew was not recorded."),
+            recorded => writeln!(
+                out,
+                "\nA scene that misses a balance is solved anew, on a finer path or with another contact \
+                 rule. {recorded} of {scenes}\nrecords say whether this was so: {} scenes were solved \
+                 more than once.",
+                self.retried
+            ),
+        };
+        out += "\nIterations are those of Newton's method on the path that was kept. Times are processor \
+                times of all paths\nof a scene; on which processor was not recorded.\n\n";
         out += &table::markdown(&self.indenters);
         let failures: Vec<_> = [("first run", first_run), ("now", now)]
             .into_iter()
