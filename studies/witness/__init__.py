@@ -1,0 +1,1 @@
+"""Another finite-element model of a finger, for studies/tetrahedra.py."""
