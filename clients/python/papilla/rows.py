@@ -9,22 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import wire
-from .answer import ErrorEstimate, Summary, Touch
-from .series import Array, Series
+from .answer import Touch
+from .series import CARRIED, MEMBERS, TIMES, Array, Series
 from .wire import SIDE_PX
 
 Rooms: TypeAlias = list[tuple[int, NDArray[np.uint8]]]
 """Places in the message of an answer, and where what begins there goes."""
 _MAP_BYTES: Final = 4 * SIDE_PX**2
-# Sections of float32, and what a series calls them.
-_FLOATS: Final = {
-    "pressure": "pressure_pa",
-    "shear": "shear_pa",
-    "displacement": "displacement_mm",
-    "points": "points_j_per_m3",
-    "point_rates": "point_rates_hz",
-    "actuators": "actuators",
-}
 _RATES_HEAD: Final = "head of the rates"
 
 
@@ -78,20 +69,18 @@ class Rows:
             found["sed_j_per_m3"] = _square(self._scaled("map", heads["scale"]))
         if "rates" in rows:
             found["rates_hz"] = _square(self._scaled("rates", rows[_RATES_HEAD][:, :4].view("<f4")[:, 0]))
-        for section, name in _FLOATS.items():
-            if section in rows:
+        for section, (_, name) in CARRIED.items():
+            if section in rows and section != "rates":
                 values = rows[section].view("<f4")
                 if section in ("shear", "displacement"):
                     values = values.reshape(len(heads), -1, 3)
                 found[name] = _square(values) if section == "pressure" else values
-        if "touch" in rows:
-            found |= _touch(rows["touch"].view("<f4").astype(np.float64))
-        for section, kind in (("summary", Summary), ("error_estimate", ErrorEstimate)):
+        for section, (kind, start) in MEMBERS.items():
             if section in rows:
-                start = "error" if section == "error_estimate" else section
-                columns = rows[section].view("<f4").astype(np.float64).T.copy()
-                found |= {f"{start}_{name}": column for name, column in zip(kind._fields, columns, strict=True)}
-        for name in ("total_us", "queue_us", "infer_us"):
+                numbers = rows[section].view("<f4").astype(np.float64)
+                columns = _touch(numbers) if kind is Touch else numbers.T.copy()
+                found |= {f"{start}{name}": column for name, column in zip(kind._fields, columns, strict=True)}
+        for name in TIMES:
             found[name] = heads[name].astype(np.int64)
         return found
 
@@ -104,15 +93,15 @@ def _square(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return values.reshape(-1, SIDE_PX, SIDE_PX) if 4 * values.shape[1] == _MAP_BYTES else values
 
 
-def _touch(numbers: NDArray[np.float64]) -> dict[str, Array]:
+def _touch(numbers: NDArray[np.float64]) -> list[Array]:
     """The members of `Touch`, of the numbers in its section."""
-    found: dict[str, Array] = {}
+    found: list[Array] = []
     at = 0
     for name in Touch._fields:
         if name in ("force_n", "torque_n_mm", "centre_mm"):
-            found[f"touch_{name}"] = numbers[:, at : at + 3].copy()
+            found.append(numbers[:, at : at + 3].copy())
             at += 3
         else:
-            found[f"touch_{name}"] = numbers[:, at].copy()
+            found.append(numbers[:, at].copy())
             at += 1
     return found

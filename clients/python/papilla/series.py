@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,25 @@ if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[Any]
+
+CARRIED: Final = {
+    "rates": ("rates", "rates_hz"),
+    "pressure": ("pressure_pa", "pressure_pa"),
+    "shear": ("shear_pa", "shear_pa"),
+    "displacement": ("displacement_mm", "displacement_mm"),
+    "points": ("points", "points_j_per_m3"),
+    "point_rates": ("point_rates_hz", "point_rates_hz"),
+    "actuators": ("actuators", "actuators"),
+}
+"""By the section of an answer that holds it: the member of `Answer`, and what a series calls it."""
+MEMBERS: Final[dict[str, tuple[type[Touch | Summary | ErrorEstimate], str]]] = {
+    "touch": (Touch, "touch_"),
+    "summary": (Summary, "summary_"),
+    "error_estimate": (ErrorEstimate, "error_"),
+}
+"""By the section of an answer: the type whose members are quantities of a series, and what their names begin with."""
+TIMES: Final = ("total_us", "queue_us", "infer_us")
+"""Times in the service, which every answer has."""
 
 
 class Series:
@@ -169,23 +188,15 @@ def _quantities(answer: Answer) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if answer.values is not None or answer.vertices is not None:
         found["sed_j_per_m3"] = answer.sed
-    for name, value in (
-        ("rates_hz", answer.rates), ("pressure_pa", answer.pressure_pa), ("shear_pa", answer.shear_pa),
-        ("displacement_mm", answer.displacement_mm),
-        ("points_j_per_m3", answer.points), ("point_rates_hz", answer.point_rates_hz), ("actuators", answer.actuators),
-    ):  # fmt: skip
+    for member, name in CARRIED.values():
+        value = getattr(answer, member)
         if value is not None:
             found[name] = value
-    if answer.touch is not None:
-        for name in Touch._fields:
-            found[f"touch_{name}"] = np.asarray(getattr(answer.touch, name), np.float64)
-    if answer.summary is not None:
-        for name in Summary._fields:
-            found[f"summary_{name}"] = np.float64(getattr(answer.summary, name))
-    if answer.error_estimate is not NOT_STATED:
-        for name in ErrorEstimate._fields:
-            found[f"error_{name}"] = np.float64(getattr(answer.error_estimate, name))
-    for name in ("total_us", "queue_us", "infer_us"):
+    for section, (kind, start) in MEMBERS.items():
+        members = getattr(answer, section)
+        if members is not None and members is not NOT_STATED:
+            found |= {f"{start}{name}": np.asarray(getattr(members, name), np.float64) for name in kind._fields}
+    for name in TIMES:
         found[name] = np.int64(getattr(answer, name))
     return found
 
