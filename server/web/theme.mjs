@@ -1,7 +1,8 @@
 // Dark and light: as the system has it, unless the visitor chose otherwise; the choice is kept.
 
 const KEY = 'papilla-theme';
-const dark = matchMedia('(prefers-color-scheme: dark)');
+const DARK = '(prefers-color-scheme: dark)';
+const dark = matchMedia(DARK);
 const listeners = [];
 
 const kept = () => {
@@ -19,9 +20,11 @@ export function onTheme(listener) {
   listeners.push(listener);
 }
 
+/** @param {'dark' | 'light' | null} theme null: as the system has it */
 function set(theme) {
   if (theme) document.documentElement.dataset.theme = theme;
   else delete document.documentElement.dataset.theme;
+  document.getElementById('dark').media = { dark: 'all', light: 'not all' }[theme] ?? DARK;
   for (const listener of listeners) listener();
 }
 
@@ -33,6 +36,8 @@ export function themeButton(button) {
     button.title = button.getAttribute('aria-label');
   };
   listeners.push(show);
+  // Colours that were chosen before their file was there.
+  document.getElementById('dark').addEventListener('load', () => listeners.forEach((listener) => listener()));
   button.addEventListener('click', () => {
     const other = isDark() ? 'light' : 'dark';
     const isSystem = (other === 'dark') === dark.matches;
