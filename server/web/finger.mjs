@@ -8,6 +8,7 @@ import { computeNormals } from './atlas.mjs';
 import { bodyMesh, followingOf, nailMesh } from './body.mjs';
 import { fringeOf } from './mask.mjs';
 import { arrowMesh, indenterMesh } from './indenter.mjs';
+import { fit } from './sheet.mjs';
 import { onTheme } from './theme.mjs';
 import { ARROW_FRAGMENT, BODY_FRAGMENT, BODY_VERTEX, GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
 
@@ -176,14 +177,8 @@ export class FingerView {
   draw() {
     if (!this.dirty || this.gl.isContextLost()) return;
     const { gl, canvas } = this;
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
-    const width = Math.round(canvas.clientWidth * ratio);
-    const height = Math.round(canvas.clientHeight * ratio);
-    if (width === 0 || height === 0) return;
-    if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
-      canvas.height = height;
-    }
+    if (fit(canvas) === 0) return;
+    const { width, height } = canvas;
     this.dirty = false;
     this.#aimCamera();
     gl.viewport(0, 0, width, height);

@@ -42,6 +42,17 @@ uniform mat4 u_view;
 uniform mat4 u_projection;
 `;
 
+// How skin and nail are lit, of their normal and the direction to the eye: what their colour is multiplied by, the gloss
+// on it, and what of their colour is added at the rim.
+const SHADE = `
+vec3 shade(vec3 n, vec3 eye, float glossiness) {
+  vec3 lamp = vec3(-0.35, 0.55, 0.75);
+  float key = 0.5 + 0.5 * dot(n, normalize(lamp));
+  float gloss = glossiness * pow(max(dot(n, normalize(eye + lamp)), 0.0), 30.0);
+  return vec3(0.38 + 0.62 * key * key, gloss, 0.14 * pow(1.0 - abs(dot(n, eye)), 3.0));
+}
+`;
+
 export const SKIN_VERTEX = `#version 300 es
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in vec3 a_normal;
@@ -72,6 +83,7 @@ in vec3 v_normal;
 in vec2 v_uv;
 out vec4 colour;
 
+${SHADE}
 /** Where a value lies on the scale, 0 to 1. */
 float place(float value) {
   float t = value / u_max;
@@ -88,13 +100,10 @@ void main() {
   vec3 eye = normalize(-v_view);
   // Seen from behind, as where the patch ends, it is skin as well.
   if (!gl_FrontFacing) n = -n;
-  float key = 0.5 + 0.5 * dot(n, normalize(vec3(-0.35, 0.55, 0.75)));
-  float light = 0.38 + 0.62 * key * key;
-  float gloss = 0.10 * pow(max(dot(n, normalize(eye + vec3(-0.35, 0.55, 0.75))), 0.0), 30.0);
-  float rim = 0.14 * pow(1.0 - abs(dot(n, eye)), 3.0);
+  vec3 shaded = shade(n, eye, 0.10);
   // Painted skin is shaded less: its colour is a value to be read off the scale.
-  vec3 lit = mix(u_clay * light, painted * (0.72 + 0.28 * light), paint) + gloss + rim * u_clay;
-  colour = vec4(lit, 1.0);
+  vec3 lit = mix(u_clay * shaded.x, painted * (0.72 + 0.28 * shaded.x), paint);
+  colour = vec4(lit + shaded.y + shaded.z * u_clay, 1.0);
 }`;
 
 // The rest of the finger, lit like the skin, and its nail, which shines.
@@ -118,15 +127,13 @@ uniform float u_gloss;
 in vec3 v_view;
 in vec3 v_normal;
 out vec4 colour;
+${SHADE}
 void main() {
   vec3 n = normalize(v_normal);
   vec3 eye = normalize(-v_view);
   if (dot(n, eye) < 0.0) n = -n;
-  float key = 0.5 + 0.5 * dot(n, normalize(vec3(-0.35, 0.55, 0.75)));
-  float light = 0.38 + 0.62 * key * key;
-  float gloss = (0.10 + u_gloss) * pow(max(dot(n, normalize(eye + vec3(-0.35, 0.55, 0.75))), 0.0), 30.0);
-  float rim = 0.14 * pow(1.0 - abs(dot(n, eye)), 3.0);
-  colour = vec4(u_tint * light + gloss + rim * u_tint, 1.0);
+  vec3 shaded = shade(n, eye, 0.10 + u_gloss);
+  colour = vec4(u_tint * (shaded.x + shaded.z) + shaded.y, 1.0);
 }`;
 
 export const GLASS_VERTEX = `#version 300 es

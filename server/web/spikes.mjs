@@ -1,5 +1,6 @@
 // A raster plot of the finger's touch fibres: a row a fibre, a band a class, the last two seconds.
 
+import { sheetOf } from './sheet.mjs';
 import { onTheme } from './theme.mjs';
 
 const SPAN_MS = 2000;
@@ -113,15 +114,9 @@ export class SpikeView {
   }
 
   #draw(nowMs) {
-    const { canvas } = this;
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    const [w, h] = [width, height].map((px) => Math.round(px * ratio));
-    if (w === 0 || h === 0) return;
-    if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
-    const context = canvas.getContext('2d');
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
+    const sheet = sheetOf(this.canvas);
+    if (!sheet) return;
+    const { context, width, height } = sheet;
     context.font = '11px system-ui, sans-serif';
     const total = SHOWN.reduce((sum, n) => sum + n, 0);
     const rowPx = (height - AXIS_PX - BAND_PX * CLASSES.length) / total;

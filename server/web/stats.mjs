@@ -1,6 +1,7 @@
 // Live figures of the session: percentiles over the last frames, rates, counts and a strip chart.
 
 import { roundUp } from './colour.mjs';
+import { fit } from './sheet.mjs';
 
 const WINDOW = 240;
 
@@ -79,14 +80,9 @@ export class Stats {
 
 /** Strip chart of the round trips, newest on the right, with the budget as a line; returns its top, ms. */
 export function drawStrip(canvas, ring, budgetMs) {
-  const ratio = Math.min(2, window.devicePixelRatio || 1);
-  const width = Math.round(canvas.clientWidth * ratio);
-  const height = Math.round(canvas.clientHeight * ratio);
-  if (width === 0 || height === 0) return NaN;
-  if (canvas.width !== width || canvas.height !== height) {
-    canvas.width = width;
-    canvas.height = height;
-  }
+  const ratio = fit(canvas);
+  if (ratio === 0) return NaN;
+  const { width, height } = canvas;
   const context = canvas.getContext('2d');
   const style = getComputedStyle(canvas);
   const accent = style.getPropertyValue('--accent');

@@ -1,6 +1,7 @@
 // The last seconds as curves, and a recording of the press that can be sent again.
 
 import { roundUp } from './colour.mjs';
+import { sheetOf } from './sheet.mjs';
 import { onTheme } from './theme.mjs';
 
 const SPAN_MS = 10000;
@@ -97,15 +98,9 @@ export class Timeline {
   draw(nowMs) {
     if (nowMs - this.lastMs < 60) return;
     this.lastMs = nowMs;
-    const { canvas } = this;
-    const ratio = Math.min(2, window.devicePixelRatio || 1);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    const [w, h] = [width, height].map((px) => Math.round(px * ratio));
-    if (w === 0 || h === 0) return;
-    if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
-    const context = canvas.getContext('2d');
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
+    const sheet = sheetOf(this.canvas);
+    if (!sheet) return;
+    const { context, width, height } = sheet;
     const bottom = height - 14;
     context.font = '11px system-ui, sans-serif';
     context.fillStyle = this.line;
