@@ -1,10 +1,9 @@
 //! `fit`: the finger that comes closest to people's, or to a person's own records.
 
+use super::people::OfPeople;
 use papilla_fe_datagen::cli::{print, refuse_unknown};
-use papilla_progress::Progress;
 use papilla_studies::people::fit::parameters::{Moved, PARAMETERS};
 use papilla_studies::people::fit::{self, Options, PARTS, record};
-use papilla_studies::people::measured::Measured;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -43,26 +42,14 @@ pub(super) struct Args {
     /// uncorrected.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(0..=100))]
     graded: u16,
-    /// Measurements in the place of those that come with the program.
-    #[arg(long, value_name = "FILE")]
-    measured: Option<PathBuf>,
-    /// Folder for the report, the finger and what a restart needs.
-    #[arg(long)]
-    out: PathBuf,
-    /// Also write the page to this file, its plot into pictures/fit beside it.
-    #[arg(long, value_name = "FILE")]
-    markdown: Option<PathBuf>,
-    /// Print the fit as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    people: OfPeople,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     refuse_unknown(&args.only, &PARTS)?;
-    let measured = match &args.measured {
-        Some(file) => Measured::read(file)?,
-        None => Measured::shipped()?,
-    };
+    let people = &args.people;
+    let measured = people.measured()?;
     let read = |path: &PathBuf| Ok((path.display().to_string(), record::read(path)?));
     let records = args.record.iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
     refuse_unknown(&args.moved, &PARAMETERS.map(|p| p.key))?;
@@ -74,17 +61,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         only: args.only.clone(),
     };
     let all = options.design + options.rounds + options.graded;
-    let progress = Progress::new("fingers", all, 0, args.json);
-    let tell = &mut |what: &str, done: usize, all: usize| {
-        progress.set_length(all);
-        progress.set_position(done);
-        progress.set_message(what);
-    };
-    let fit = fit::run(&measured, records, &options, &args.out, tell)?;
-    drop(progress);
-    if let Some(page) = &args.markdown {
+    let fit = people
+        .told("fingers", all, |told| fit::run(&measured, records, &options, &people.out, told))?;
+    if let Some(page) = &people.markdown {
         fit.write_page(page)?;
     }
-    print(&fit, args.json, || fit.human())?;
+    print(&fit, people.json, || fit.human())?;
     Ok(ExitCode::SUCCESS)
 }

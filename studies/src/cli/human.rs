@@ -1,9 +1,8 @@
 //! `human`: the finger beside what was measured on people's.
 
+use super::people::OfPeople;
 use papilla_fe_datagen::cli::{CHECKS_FAILED, choices, print, refuse_unknown};
 use papilla_fingertip::scene::{Finger, FingerError};
-use papilla_progress::Progress;
-use papilla_studies::people::measured::Measured;
 use papilla_studies::people::study::{self, Materials, Options, PARTS};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -29,26 +28,14 @@ pub(super) struct Args {
     /// A finger of your own: its folder, its finger.toml, or its name in fingers/.
     #[arg(long, value_name = "FINGER")]
     finger: Option<PathBuf>,
-    /// Measurements in the place of those that come with the program.
-    #[arg(long, value_name = "FILE")]
-    measured: Option<PathBuf>,
-    /// Folder for the report, the plots and what a restart needs.
-    #[arg(long)]
-    out: PathBuf,
-    /// Also write the page to this file, its plots into pictures/human beside it.
-    #[arg(long, value_name = "FILE")]
-    markdown: Option<PathBuf>,
-    /// Print the report as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    people: OfPeople,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     refuse_unknown(&args.only, &PARTS)?;
-    let measured = match &args.measured {
-        Some(file) => Measured::read(file)?,
-        None => Measured::shipped()?,
-    };
+    let people = &args.people;
+    let measured = people.measured()?;
     let named = |path: &PathBuf| {
         Ok::<_, FingerError>((path.display().to_string(), Finger::find(path, Path::new(""))?))
     };
@@ -59,18 +46,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         density: args.density.into(),
         only: args.only.clone(),
     };
-    papilla_output::atomic::create_folder(&args.out)?;
-    let progress = Progress::new("presses", 0, 0, args.json);
-    let tell = &mut |what: &str, done: usize, all: usize| {
-        progress.set_length(all);
-        progress.set_position(done);
-        progress.set_message(what);
-    };
-    let report = study::run(&measured, &options, &args.out, tell)?;
-    drop(progress);
-    if let Some(page) = &args.markdown {
+    let report =
+        people.told("presses", 0, |told| study::run(&measured, &options, &people.out, told))?;
+    if let Some(page) = &people.markdown {
         report.write_page(page)?;
     }
-    print(&report, args.json, || report.human())?;
+    print(&report, people.json, || report.human())?;
     Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
 }

@@ -1,4 +1,4 @@
-//! The command line: one file a study.
+//! The command line: one file a study, and what two of them share.
 
 mod actuators;
 mod calculix;
@@ -6,6 +6,7 @@ mod effects;
 mod fit;
 mod human;
 mod operators;
+mod people;
 mod spikes;
 mod wedge;
 
