@@ -1,12 +1,11 @@
 //! Charts as SVG: lines and labelled points on linear or logarithmic axes.
 
-mod labels;
+pub mod labels;
 pub mod palette;
 mod scale;
 mod ticks;
 
 use super::OutputError;
-use labels::Labels;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{Pos, VPos};
@@ -70,6 +69,8 @@ pub struct Chart {
 }
 
 const SIZE_PX: (u32, u32) = (880, 560);
+/// Height of the names of dots, px.
+const TEXT_PX: i32 = 14;
 /// Colours of the series, in their order.
 const COLOURS: [RGBColor; 8] = [
     palette::BLUE,
@@ -139,20 +140,25 @@ fn draw_on(area: &Area<'_>, chart: &Chart, x: Scale, y: Scale) -> Drawn {
         .label_style(("sans-serif", 14))
         .draw()?;
     let (xs, ys) = context.plotting_area().get_pixel_range();
-    let mut labels = Labels::new([xs.start, ys.start, xs.end, ys.end]);
-    for series in chart.series.iter().filter(|s| s.mark == Mark::Dots) {
-        let points = series.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
-        points.for_each(|p| labels.dot(context.backend_coord(p)));
-    }
+    let is_finite = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite();
+    let dots = chart.series.iter().filter(|s| s.mark == Mark::Dots);
+    let dots: Vec<((i32, i32), &str)> = dots
+        .flat_map(|series| {
+            let points = series.points.iter().filter(is_finite);
+            points.map(|p| (context.backend_coord(p), series.name.as_str()))
+        })
+        .collect();
+    let within = [xs.start, ys.start, xs.end, ys.end];
+    let mut places = labels::places(within, TEXT_PX, &dots).into_iter();
     for (i, series) in chart.series.iter().enumerate() {
         let colour = COLOURS[i % COLOURS.len()];
-        let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
-        let points = series.points.iter().copied().filter(finite);
+        let points = series.points.iter().filter(is_finite).copied();
         if series.mark == Mark::Dots {
-            for at in points {
-                let (from, side) = labels.place(&series.name, context.backend_coord(&at));
-                let style = ("sans-serif", labels::TEXT_PX).into_text_style(area);
-                let style = style.pos(Pos::new(side, VPos::Center));
+            for (at, place) in points.zip(&mut places) {
+                let (x, y) = context.backend_coord(&at);
+                let from = (place.anchor.0 - x, place.anchor.1 - y);
+                let style = ("sans-serif", TEXT_PX).into_text_style(area);
+                let style = style.pos(Pos::new(place.side, VPos::Center));
                 let text = Text::new(series.name.clone(), from, style);
                 let dot = Circle::new((0, 0), labels::DOT_PX, colour.filled());
                 context.draw_series([EmptyElement::at(at) + dot + text])?;

@@ -1,16 +1,16 @@
 //! The ladder as pictures: error against time, and the nail-base zone on the atlas.
 
-mod labels;
 mod zone;
 
 use super::report;
-use labels::Labels;
 use papilla_engine::ladder::{Kind, Ladder, REFERENCE_SET, Rung};
+use papilla_output::plot::labels;
 use papilla_output::plot::palette::{self, GREY};
 use plotters::coord::Shift;
 use plotters::coord::combinators::LogCoord;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{Pos, VPos};
 
 pub use zone::nail_base_zone;
 
@@ -168,16 +168,17 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
         chart.plotting_area().draw(&Circle::new((point.time_ms, point.error), 5, style))?;
     }
     let at = |ms: f64, error: f64| chart.backend_coord(&(ms, error));
-    let places: Vec<(i32, i32)> = points.iter().map(|p| at(p.time_ms, p.error)).collect();
     let base = area.get_base_pixel();
     let (left, top) = at(times.start, errors.end);
     let (_, bottom) = at(times.end, errors.start);
     let (width, _) = area.dim_in_pixel();
-    let frame = [left, top, base.0 + width as i32, bottom];
-    let mut labels = Labels::new(&places, frame);
-    for (point, place) in points.iter().zip(&places) {
-        let (x, y) = labels.place(*place, &point.name);
-        area.draw(&Text::new(point.name.clone(), (x - base.0, y - base.1), font()))?;
+    let within = [left, top, base.0 + width as i32, bottom];
+    let dots: Vec<((i32, i32), &str)> =
+        points.iter().map(|p| (at(p.time_ms, p.error), p.name.as_str())).collect();
+    for ((_, name), place) in dots.iter().zip(labels::places(within, FONT_PX, &dots)) {
+        let (x, y) = place.anchor;
+        let style = font().pos(Pos::new(place.side, VPos::Center));
+        area.draw(&Text::new(*name, (x - base.0, y - base.1), style))?;
     }
     for (ms, words) in budgets.iter().filter(|(ms, _)| times.contains(ms)) {
         let (x, y) = at(*ms, errors.end);
