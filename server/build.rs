@@ -17,13 +17,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let endings = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp", "txt"];
     let mut page = files(&root.join("web"), &endings)?;
     // The web client's: the page has its connection, its atlas and its pixels. What needs three.js
-    // is in web/ in its place, bundled with it.
+    // is in web/ in its place, bundled to import the three.js there.
     let own = page.clone();
     let is_bundled = |path: &PathBuf| own.iter().any(|file| file.file_name() == path.file_name());
     let client = files(&root.join("../clients/web/src"), &["js"])?;
     page.extend(client.into_iter().filter(|path| !is_bundled(path)));
     embed(page, &out.join("page.rs"))?;
-    embed(files(&root.join("web/xr"), &["html", "js", "txt"])?, &out.join("scene.rs"))?;
+    embed(files(&root.join("web/xr"), &["html", "js"])?, &out.join("scene.rs"))?;
     Ok(())
 }
 

@@ -50,7 +50,13 @@ async fn without_a_folder_the_scene_of_the_binary_is_at_xr() {
     assert!(page.header("etag").is_some());
     let script = service.get("/xr/scene.js").send().await;
     assert_eq!(script.header("content-type"), Some("text/javascript; charset=utf-8"));
-    assert!(script.body.len() > 100_000, "{} bytes", script.body.len());
+    let script = script.text();
+    assert!(script.contains("from\"./three.js\""), "{} bytes", script.len());
+    // What it shares with the page is one file, at both places.
+    let [below, of_page] = [service.get("/xr/three.js"), service.get("/three.js")];
+    let [below, of_page] = [below.send().await, of_page.send().await];
+    assert!(below.body.len() > 100_000, "{} bytes", below.body.len());
+    assert!(below.body == of_page.body);
     // Of the page's own files there are none below, and the other way round.
     for path in
         ["/xr/papilla.mjs", "/xr/nothing.js", "/xr/../index.html", "/xr//scene.js", "/scene.js"]

@@ -62,9 +62,15 @@ pub(crate) async fn file(State(app): Shared, uri: Uri, headers: HeaderMap) -> An
     serve(&app, PAGE, Part::File, uri.path().trim_start_matches('/'), &headers).await
 }
 
+/// Files of the page that the scene has in its folder as well.
+const OF_BOTH: [&str; 2] = ["three.js", "three.js.LEGAL.txt"];
+
 /// A file of the scene, `/xr/` for its page.
 pub(crate) async fn scene(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
     let name = uri.path().trim_start_matches("/xr/");
+    if OF_BOTH.contains(&name) {
+        return serve(&app, PAGE, Part::File, name, &headers).await;
+    }
     let name = if name.is_empty() { "index.html" } else { name };
     serve(&app, SCENE, Part::Scene, name, &headers).await
 }
