@@ -7,10 +7,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use bytes::BytesMut;
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
 use papilla_engine::{EngineError, processor_time};
 use papilla_metrics::{Metrics, Stage};
-use papilla_proto::{ERROR_ESTIMATE_LEN, ErrorCode, MapSummary, PressureRange, Problem, flags};
+use papilla_proto::{
+    ERROR_ESTIMATE_LEN, ErrorCode, ErrorEstimate, MapSummary, PressureRange, Problem, flags,
+};
 use papilla_render::{
     Known, KnownErrors, Maps, Read, Rendering, Source, require_finite, source_of,
 };
@@ -234,14 +237,7 @@ impl Worker {
         let extra = finger.as_ref().map_or(0, |finger| finger.sections_len() + ERROR_ESTIMATE_LEN);
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint() + extra);
-            buffer.resize(headroom, 0);
-            if let Some(finger) = &mut finger {
-                finger.write(buffer);
-                require_finite(&buffer[headroom..])?;
-                if finger.tells_error() {
-                    buffer.extend_from_slice(&meta.errors.encode());
-                }
-            }
+            begin_answer(buffer, headroom, finger.as_deref_mut(), &meta.errors)?;
             let Maps { pressure_pa, sed_j_per_m3: sed, .. } = &self.maps;
             let written = effects
                 .write(pressure_pa, sed, time_us, buffer)
@@ -251,14 +247,7 @@ impl Worker {
             (buffer.split(), written.scale)
         } else {
             let buffer = recycler.claim(headroom + job.output.size_hint() + extra);
-            buffer.resize(headroom, 0);
-            if let Some(finger) = &mut finger {
-                finger.write(buffer);
-                require_finite(&buffer[headroom..])?;
-                if finger.tells_error() {
-                    buffer.extend_from_slice(&meta.errors.encode());
-                }
-            }
+            begin_answer(buffer, headroom, finger.as_deref_mut(), &meta.errors)?;
             let map = Map {
                 quantity: Quantity::Sed,
                 values: &self.maps.sed_j_per_m3,
@@ -323,6 +312,27 @@ impl Worker {
         let skin = &self.fingers[finger].catalogue.skin_pixels;
         Ok((self.maps.check(range, skin)?, range, Source::Map))
     }
+}
+
+/// Begins an answer behind `headroom` free bytes: with what the finger felt, and how wrong the answer
+/// is likely to be, if it has a finger.
+///
+/// # Errors
+/// What the finger felt is not finite.
+fn begin_answer(
+    buffer: &mut BytesMut,
+    headroom: usize,
+    finger: Option<&mut Finger>,
+    errors: &ErrorEstimate,
+) -> Result<(), Problem> {
+    buffer.resize(headroom, 0);
+    let Some(finger) = finger else { return Ok(()) };
+    finger.write(buffer);
+    require_finite(&buffer[headroom..])?;
+    if finger.tells_error() {
+        buffer.extend_from_slice(&errors.encode());
+    }
+    Ok(())
 }
 
 /// Nobody ever waits here: at most one job of a finger is being rendered.
