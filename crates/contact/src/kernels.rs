@@ -3,7 +3,7 @@
 //! The code that runs over vectors is a type with [`WithSimd`]. A closure would be compiled for the
 //! plainest processor, unless the compiler happened to inline it.
 
-use crate::compliance::{Compliance, TILE, TILE_LEN};
+use crate::compliance::{Compliance, TILE, TILE_LEN, Tiles};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Runs `work` for the widest vectors of this processor.
@@ -137,6 +137,18 @@ impl WithSimd for DisplaceTiles<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        match self.compliance.tiles() {
+            Tiles::Values(values) => self.displace(simd, &Values(values)),
+            Tiles::Steps { steps, mm_per_n } => {
+                self.displace(simd, &Steps { steps, mm_per_n: *mm_per_n });
+            }
+        }
+    }
+}
+
+impl DisplaceTiles<'_> {
+    #[inline(always)]
+    fn displace<S: Simd>(self, simd: S, stored: &impl Stored) {
         const PLANE: usize = TILE * TILE;
         let Self { compliance, pushing, force, moving, moved } = self;
         for tile in moving {
@@ -144,21 +156,54 @@ impl WithSimd for DisplaceTiles<'_> {
         }
         for from in pushing {
             let force = &force[*from as usize];
-            let row = &compliance.tiles()[*from as usize * compliance.side() * TILE_LEN..];
+            let row = *from as usize * compliance.side();
             for to in moving {
-                let tile = &row[*to as usize * TILE_LEN..][..TILE_LEN];
+                let tile = (row + *to as usize) * TILE_LEN;
                 let mut sums = moved[*to as usize];
                 for (b, force) in force.iter().enumerate() {
                     for (j, force) in force.iter().enumerate().filter(|(_, f)| **f != 0.0) {
                         for (a, sum) in sums.iter_mut().enumerate() {
-                            let column = &tile[(3 * b + a) * PLANE + j * TILE..][..TILE];
-                            add_scaled(simd, sum, *force, column);
+                            let column = stored.column(tile + (3 * b + a) * PLANE + j * TILE);
+                            add_scaled(simd, sum, *force, &column);
                         }
                     }
                 }
                 moved[*to as usize] = sums;
             }
         }
+    }
+}
+
+/// Tiles as they are stored.
+trait Stored {
+    /// Displacements of a tile's vertices under one force, mm/N, from a place on.
+    fn column(&self, at: usize) -> [f32; TILE];
+}
+
+struct Values<'a>(&'a [f32]);
+
+impl Stored for Values<'_> {
+    #[inline(always)]
+    fn column(&self, at: usize) -> [f32; TILE] {
+        let mut column = [0.0; TILE];
+        column.copy_from_slice(&self.0[at..][..TILE]);
+        column
+    }
+}
+
+struct Steps<'a> {
+    steps: &'a [i16],
+    mm_per_n: f32,
+}
+
+impl Stored for Steps<'_> {
+    #[inline(always)]
+    fn column(&self, at: usize) -> [f32; TILE] {
+        let mut column = [0.0; TILE];
+        for (to, steps) in column.iter_mut().zip(&self.steps[at..][..TILE]) {
+            *to = f32::from(*steps) * self.mm_per_n;
+        }
+        column
     }
 }
 

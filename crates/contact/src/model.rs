@@ -161,7 +161,11 @@ impl ContactModel {
             normals: triples(&arrays.normals),
             areas_mm2: arrays.areas_mm2,
             triangles,
-            compliance: Compliance::unpacked(&arrays.compliance_mm_per_n, rank)?,
+            compliance: Compliance::unpacked(
+                &arrays.compliance_mm_per_n,
+                rank,
+                header.compliance_step_mm_per_n,
+            )?,
             clusters,
             second_order,
             slopes,
