@@ -24,7 +24,7 @@ const DRAIN_TIMED_OUT: u8 = 5;
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
-    allocator::take_small_pages();
+    allocator::begin();
     match run() {
         Ok(code) => code,
         Err(error) => {
