@@ -29,6 +29,10 @@ const SLACK: usize = 4 << 20;
 /// Settings under which the sum is that of [`CLIENTS`] connections with a request each.
 const PLACES: [&str; 6] = ["--max-connections", "8", "--max-requests", "4", "--max-sessions", "1"];
 
+/// Most bytes that the service holds of its own right after the start with the shipped models: half
+/// of them are the compliance of the finger. The start itself uses twice as much.
+const STARTED_MAX: usize = 90 << 20;
+
 /// A field of `/proc/PID/status`, bytes.
 fn status(id: u32, field: &str) -> usize {
     let text = fs::read_to_string(format!("/proc/{id}/status")).unwrap();
@@ -241,6 +245,19 @@ async fn no_message_takes_more_than_the_documented_sum() {
         }
     }
     assert!(beyond.is_empty(), "more than {} MiB: {beyond:#?}", sum >> 20);
+}
+
+/// What the start uses to load models, and does not keep, is the system's when it is over.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_start_holds_little_beside_what_it_keeps() {
+    if !cfg!(target_os = "linux") {
+        eprintln!("skipped: resident memory is read from /proc, which Linux has");
+        return;
+    }
+    let running = Running::start(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models"));
+    let held = status(running.child.id(), "RssAnon");
+    eprintln!("{:.1} MiB after the start", held as f64 / (1 << 20) as f64);
+    assert!(held <= STARTED_MAX, "{} MiB", held >> 20);
 }
 
 /// What fingers took is the system's again once their sessions are over.
