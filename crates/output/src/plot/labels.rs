@@ -1,5 +1,5 @@
-//! Names beside dots, where they are read: within the chart, over no dot and no other name, and
-//! nearer to their own dot than to any other.
+//! Names beside dots, where they are read: within the chart, over no dot and no other name, nearer to
+//! their own dot than to any other, and not on a line where there is a place beside it.
 
 use plotters::style::text_anchor::HPos;
 
@@ -9,11 +9,15 @@ pub const DOT_PX: i32 = 5;
 const LETTER: f64 = 0.5;
 /// Room between the middle of a dot and its name beside it, px.
 const GAP_PX: i32 = 9;
+/// How many places later a place on a line is tried.
+const ON_LINE: usize = 8;
 /// Most places that are tried for all names together.
 const STEPS_MAX: usize = 50_000;
 
 /// Left, top, right, bottom, px.
 type Box4 = [i32; 4];
+/// Where a straight line begins and ends, px.
+pub type Line = [(i32, i32); 2];
 
 /// Where a name stands.
 #[derive(Clone, Copy)]
@@ -27,22 +31,31 @@ pub struct Place {
 }
 
 /// Places of the names of dots within a part of a picture (left, top, right, bottom, px), in the
-/// dots' order. `text_px` is the height of the names.
+/// dots' order. `text_px` is the height of the names, and `lines` are what they had better not lie on.
 ///
 /// Of the combinations of places that are tried, the one is taken whose names stand nearest to
 /// where they are looked for: beside the dot, then above and below. Where dots are so crowded that
 /// no place is good for a name, the one is taken that covers least.
 #[must_use]
-pub fn places(within: Box4, text_px: i32, dots: &[((i32, i32), &str)]) -> Vec<Place> {
+pub fn places(
+    within: Box4,
+    text_px: i32,
+    dots: &[((i32, i32), &str)],
+    lines: &[Line],
+) -> Vec<Place> {
     let all: Vec<Vec<Place>> =
         dots.iter().map(|(at, name)| candidates(*at, name, text_px)).collect();
-    let good: Vec<Vec<usize>> = all
-        .iter()
-        .enumerate()
-        .map(|(dot, all)| {
-            (0..all.len()).filter(|place| is_good(within, dots, dot, &all[*place])).collect()
-        })
-        .collect();
+    let cost = |place: usize, of: &Place| {
+        place + ON_LINE * lines.iter().filter(|line| crosses(of.covers, **line)).count()
+    };
+    let good_of = |dot: usize| {
+        let all = all[dot].iter().enumerate();
+        let good = all.filter(|(_, place)| is_good(within, dots, dot, place));
+        let mut good: Vec<_> = good.map(|(i, place)| (cost(i, place), i)).collect();
+        good.sort_unstable();
+        good
+    };
+    let good: Vec<Vec<(usize, usize)>> = (0..dots.len()).map(good_of).collect();
     let mut order: Vec<usize> = (0..dots.len()).filter(|dot| !good[*dot].is_empty()).collect();
     order.sort_by_key(|dot| good[*dot].len());
     let mut search = Search { all: &all, good: &good, order: &order, steps: 0, best: None };
@@ -109,8 +122,8 @@ fn is_good(within: Box4, dots: &[((i32, i32), &str)], own: usize, place: &Place)
 /// A search for the places of all names that can have a good one.
 struct Search<'a> {
     all: &'a [Vec<Place>],
-    /// By dot: which of its places are good.
-    good: &'a [Vec<usize>],
+    /// By dot: what its good places cost, and which they are, the cheapest first.
+    good: &'a [Vec<(usize, usize)>],
     /// The dots, the one with the fewest good places first.
     order: &'a [usize],
     steps: usize,
@@ -119,15 +132,14 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Tries the places of the next dot, behind those that were chosen at a cost: a place costs as
-    /// much as there are places before it.
+    /// Tries the places of the next dot, behind those that were chosen at a cost.
     fn go_on(&mut self, chosen: &mut Vec<usize>, cost: usize) {
         let Some(&dot) = self.order.get(chosen.len()) else {
             self.best = Some((cost, chosen.clone()));
             return;
         };
-        for &place in &self.good[dot] {
-            let costs = cost + place;
+        for &(costs, place) in &self.good[dot] {
+            let costs = cost + costs;
             let is_dearer = self.best.as_ref().is_some_and(|(least, _)| costs >= *least);
             self.steps += 1;
             if is_dearer || self.steps > STEPS_MAX {
@@ -166,6 +178,23 @@ fn away(from: Box4, (x, y): (i32, i32)) -> i32 {
     along(x, 0).pow(2) + along(y, 1).pow(2)
 }
 
+/// Whether a line goes through a box (Liang & Barsky 1984).
+fn crosses(of: Box4, [from, to]: Line) -> bool {
+    let (mut enters, mut leaves) = (0.0, 1.0);
+    for (from, to, low, high) in [(from.0, to.0, of[0], of[2]), (from.1, to.1, of[1], of[3])] {
+        if from == to {
+            if !(low..=high).contains(&from) {
+                return false;
+            }
+            continue;
+        }
+        let [low, high] = [low, high].map(|end| f64::from(end - from) / f64::from(to - from));
+        enters = f64::max(enters, low.min(high));
+        leaves = f64::min(leaves, low.max(high));
+    }
+    enters <= leaves
+}
+
 /// Area that two boxes share, px2.
 fn overlap(a: Box4, b: Box4) -> i32 {
     let along = |i: usize| (a[i + 2].min(b[i + 2]) - a[i].max(b[i])).max(0);
@@ -187,7 +216,7 @@ mod tests {
 
     #[test]
     fn each_name_stands_by_its_own_dot_and_over_nothing() {
-        let found = places([64, 30, 748, 540], 13, &DOTS);
+        let found = places([64, 30, 748, 540], 13, &DOTS, &[]);
         for (i, place) in found.iter().enumerate() {
             let aways = DOTS.map(|(at, _)| away(place.covers, at));
             assert_eq!(aways.iter().min(), Some(&aways[i]), "{}: {aways:?}", DOTS[i].1);
@@ -207,15 +236,29 @@ mod tests {
 
     #[test]
     fn where_there_is_room_a_name_stands_right_of_its_dot() {
-        let alone = places([0, 0, 400, 400], 13, &[((100, 100), "name"), ((100, 200), "name")]);
+        let alone =
+            places([0, 0, 400, 400], 13, &[((100, 100), "name"), ((100, 200), "name")], &[]);
         assert_eq!(alone.iter().map(|of| of.anchor).collect::<Vec<_>>(), [(109, 100), (109, 200)]);
+    }
+
+    /// A line through the dot, level, upright or askew: the name stands beside it.
+    #[test]
+    fn a_name_does_not_stand_on_a_line() {
+        let dot = [((100, 100), "name")];
+        for line in [[(0, 100), (400, 100)], [(130, 0), (130, 400)], [(60, 40), (180, 170)]] {
+            let [plain] = places([0, 0, 400, 400], 13, &dot, &[])[..] else { unreachable!() };
+            assert!(crosses(plain.covers, line), "{line:?}");
+            let [place] = places([0, 0, 400, 400], 13, &dot, &[line])[..] else { unreachable!() };
+            assert!(!crosses(place.covers, line), "{line:?}");
+        }
+        assert!(!crosses([0, 0, 10, 10], [(20, 0), (0, 30)]));
     }
 
     /// In a crowd without room, and where two dots are one, every name still has a place within.
     #[test]
     fn a_crowd_has_places_too() {
         let crowd: Vec<_> = (0..40).map(|i| ((100 + i % 6, 100 + i / 6), "some-name")).collect();
-        let found = places([0, 0, 200, 200], 13, &crowd);
+        let found = places([0, 0, 200, 200], 13, &crowd, &[]);
         assert_eq!(found.len(), 40);
         for place in found {
             let [left, top, right, bottom] = place.covers;

@@ -149,7 +149,7 @@ fn draw_on(area: &Area<'_>, chart: &Chart, x: Scale, y: Scale) -> Drawn {
         })
         .collect();
     let within = [xs.start, ys.start, xs.end, ys.end];
-    let mut places = labels::places(within, TEXT_PX, &dots).into_iter();
+    let mut places = labels::places(within, TEXT_PX, &dots, &[]).into_iter();
     for (i, series) in chart.series.iter().enumerate() {
         let colour = COLOURS[i % COLOURS.len()];
         let points = series.points.iter().filter(is_finite).copied();

@@ -161,7 +161,7 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
     let mut step: Vec<(f64, f64)> =
         points.iter().filter(|p| p.on_front).map(|p| (p.time_ms, p.error)).collect();
     step.sort_by(|a, b| a.0.total_cmp(&b.0));
-    chart.draw_series(LineSeries::new(step, GREY.mix(0.7).stroke_width(2)))?;
+    chart.draw_series(LineSeries::new(step.clone(), GREY.mix(0.7).stroke_width(2)))?;
     for point in &points {
         let colour = colour(point.kind);
         let style = if point.reference { colour.stroke_width(2) } else { colour.filled() };
@@ -175,7 +175,13 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
     let within = [left, top, base.0 + width as i32, bottom];
     let dots: Vec<((i32, i32), &str)> =
         points.iter().map(|p| (at(p.time_ms, p.error), p.name.as_str())).collect();
-    for ((_, name), place) in dots.iter().zip(labels::places(within, FONT_PX, &dots)) {
+    let front = step.windows(2).map(|ends| [ends[0], ends[1]]);
+    let floor_line = floor.map(|floor| [(times.start, floor), (times.end, floor)]);
+    let upright = budgets.iter().map(|(ms, _)| [(*ms, errors.start), (*ms, errors.end)]);
+    let lines = front.chain(floor_line).chain(upright);
+    let lines: Vec<labels::Line> =
+        lines.map(|ends| ends.map(|(ms, error)| at(ms, error))).collect();
+    for ((_, name), place) in dots.iter().zip(labels::places(within, FONT_PX, &dots, &lines)) {
         let (x, y) = place.anchor;
         let style = font().pos(Pos::new(place.side, VPos::Center));
         area.draw(&Text::new(*name, (x - base.0, y - base.1), style))?;
