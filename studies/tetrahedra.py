@@ -7,7 +7,8 @@ Presses a finger with a ball in NGSolve, on tetrahedra, and compares force and S
 `fe-datagen solve` of the same press on hexahedra. Nothing is shared but the files of the finger and the
 constants of the tissues: studies/witness has the formulas of the shape once more, meshes with gmsh, and
 solves with NGSolve. A finger may be fitted to a scan (skin.json); maps of layers are not known here. Of a
-finger without skin.json, which is symmetric, one half is meshed. The volumes of the tissues are compared too.
+finger without skin.json, which is symmetric, one half is meshed. The volumes of the tissues are compared with those of
+the formulas.
 
 Needs studies/witness/requirements.txt (PyPI) and the program fe-datagen: FE_DATAGEN, or PATH. Run it in the
 root of the repository. What is solved stays in --out and is not solved again.
@@ -62,7 +63,7 @@ offset_mm = {list(map(float, offset_mm))}
 def on_tetrahedra(out: Path, finger: Finger, size_mm: float, options) -> dict:
     """The press by NGSolve. What is solved already is read."""
     mixed = not options.displacement_alone
-    kept = out / f"tetrahedra-{size_mm:g}-{options.poisson:g}-order-{options.order}{'' if mixed else '-alone'}.npz"
+    kept = out / f"tetrahedra-{size_mm:g}-{options.poisson:g}{'' if mixed else '-alone'}.npz"
     if not kept.is_file():
         before = resource.getrusage(resource.RUSAGE_SELF)
         centre, touch = finger.touch(options.offset, BALL_MM)
@@ -70,7 +71,7 @@ def on_tetrahedra(out: Path, finger: Finger, size_mm: float, options) -> dict:
         shear, bulk = 1 / (2 * (1 + options.poisson)), 1 / (3 * (1 - 2 * options.poisson))
         laws = {tissue: (young * shear, young * bulk) for tissue, young in YOUNG_MPA.items()}
         print(f"{size_mm:g} mm: {len(mesh.tets)} tetrahedra, touch at {touch}", file=sys.stderr, flush=True)
-        found = press.press(mesh, laws, centre, BALL_MM, DEPTH_MM, options.order, mixed)
+        found = press.press(mesh, laws, centre, BALL_MM, DEPTH_MM, mixed)
         after = resource.getrusage(resource.RUSAGE_SELF)
         # Half a finger has half its force and volume. What holds its ball in the plane is no force of the whole.
         times = 2 if finger.symmetric else 1
@@ -91,32 +92,37 @@ def on_tetrahedra(out: Path, finger: Finger, size_mm: float, options) -> dict:
 
 
 def sed_differs(own, other, area) -> dict:
-    known = np.isfinite(own) & np.isfinite(other)
+    """SED at points, of which each three lie in one triangle."""
+    known = np.repeat((np.isfinite(own) & np.isfinite(other)).reshape(-1, 3).all(1), 3)
     own, other, area = own[known], other[known], area[known]
+    means = [values.reshape(-1, 3).mean(1) for values in (own, other, area)]
     return {
-        "sed_relative_l2": np.sqrt((area * (own - other) ** 2).sum() / (area * other**2).sum()),
+        "sed_relative_l2": relative_l2(own, other, area),
+        "sed_means_relative_l2": relative_l2(*means),
         "sed_largest": own.max() / other.max() - 1,
         "sed_mean": (area * own).sum() / (area * other).sum() - 1,
-        "points": int(known.sum()),
     }
+
+
+def relative_l2(own, other, area) -> float:
+    return np.sqrt((area * (own - other) ** 2).sum() / (area * other**2).sum())
 
 
 def row(name: str, elements: str, of: dict, force: float, sed: dict | None) -> str:
     text = f"| {name} | {elements} | {int(of['unknowns'])} | {float(of['s']):.0f} | {of['force_n']:.4f} |"
     text += f" {100 * force:+.2f} % |"
     if sed is None:
-        return text + " | | |"
-    text += f" {100 * sed['sed_relative_l2']:.2f} % |"
+        return text + " | | | |"
+    text += f" {100 * sed['sed_relative_l2']:.2f} % | {100 * sed['sed_means_relative_l2']:.2f} % |"
     return text + f" {100 * sed['sed_largest']:+.2f} % | {100 * sed['sed_mean']:+.2f} % |"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--finger", type=Path, default=ROOT / "models", help="its bundle, or its finger.toml")
-    parser.add_argument("--size", type=float, nargs="+", default=[0.6, 0.45], help="edges under the ball, mm")
+    parser.add_argument("--size", type=float, nargs="+", default=[0.45, 0.3], help="edges under the ball, mm")
     parser.add_argument("--density", nargs="+", default=["medium", "fine"], help="hexahedra; the last is the truth")
     parser.add_argument("--offset", type=float, nargs=2, default=[0, 0], help="of the ball's way, mm along x and y")
-    parser.add_argument("--order", type=int, default=2, help="of displacement; that of pressure is one less")
     parser.add_argument("--displacement-alone", action="store_true", help="no pressure as an unknown of its own")
     parser.add_argument("--poisson", type=float, default=POISSON, help="Poisson's ratio of all soft tissues")
     parser.add_argument("--out", type=Path, default=ROOT / "out/tetrahedra")
@@ -135,6 +141,7 @@ def main() -> None:
     for size in options.size:
         of = on_tetrahedra(out, finger, size, options)
         near = (np.linalg.norm((of["places"] - of["touch"])[:, :2], axis=1) < COMPARED_MM) & (of["places"][:, 2] < 0)
+        near = np.repeat(near.reshape(-1, 3).all(1), 3)
         places, area = of["places"][near], of["areas"][near]
         true = hexahedra.at(truth, places)
         found.append({
@@ -143,9 +150,9 @@ def main() -> None:
             **sed_differs(of["sed"][near], true, area),
             "hexahedra": {d: sed_differs(hexahedra.at(h, places), true, area) for d, h in hexes.items()},
         })
-    rows = ["| solved by | elements | unknowns | processor time, s | force, N | force: difference | SED: relative L2 |"]
-    rows[0] += " SED: largest value | SED: mean |"
-    rows += ["|---" * 9 + "|"]
+    rows = ["| solved by | elements | unknowns | processor time, s | force, N | force: difference |"]
+    rows[0] += " SED at points: L2 | SED of triangles: L2 | SED: largest value | SED: mean |"
+    rows += ["|---" * 10 + "|"]
     for density, of in hexes.items():
         sed = None if of is truth else found[-1]["hexahedra"][density]
         elements = f"{of['elements']} hexahedra, `{density}`"
@@ -153,10 +160,20 @@ def main() -> None:
     for of in found:
         elements = f"{int(of['elements'])} tetrahedra, {of['size_mm']:g} mm"
         rows.append(row("NGSolve", elements, of, of["force_n"] / truth["force_n"] - 1, of))
-    rows += ["", "| tetrahedra, mm | " + " | ".join(f"{tissue}: volume" for tissue in TISSUES) + " |", "|---" * 4 + "|"]
-    for of in found:
-        parts = (f"{100 * (of['volumes_mm3'][t] / truth['volumes_mm3'][t] - 1):+.3f} %" for t in TISSUES)
-        rows.append(f"| {of['size_mm']:g} | " + " | ".join(parts) + " |")
+    rows += ["", "| mesh | " + " | ".join(f"{tissue}: volume" for tissue in TISSUES) + " |", "|---" * 4 + "|"]
+    formulas = dict(zip(TISSUES, finger.volumes_mm3(), strict=True))
+    meshes = [(f"hexahedra, `{density}`", of) for density, of in hexes.items()]
+    meshes += [(f"tetrahedra, {of['size_mm']:g} mm", of) for of in found]
+    for name, of in meshes:
+        parts = (f"{100 * (of['volumes_mm3'][t] / formulas[t] - 1):+.3f} %" for t in TISSUES)
+        rows.append(f"| {name} | " + " | ".join(parts) + " |")
+    skin, interface = (np.array(truth["atlas"][name]["positions_mm"]) for name in ("skin", "interface"))
+    bounds = finger.bounds(finger.named(skin))
+    away = [1e6 * np.linalg.norm(a - b, axis=1) for a, b in ((skin, bounds[0]), (interface, bounds[1]))]
+    rows += ["", "| distance of `fe-datagen`'s vertices | nine in ten lie within, nm | farthest, nm |"]
+    rows.append("|---|---|---|")
+    for name, of in zip(("skin", "interface"), away, strict=True):
+        rows.append(f"| {name} | {np.percentile(of, 90):.1f} | {of.max():.1f} |")
     print("\n".join(rows))
 
 

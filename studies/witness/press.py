@@ -1,12 +1,12 @@
 """A rigid ball pressed into tetrahedra that do not lock, by NGSolve.
 
-Displacement is of order k and pressure of order k - 1 (Taylor and Hood), continuous within each tissue. The
-energy is that of docs/concepts/physics.md, with pressure p as an unknown of its own:
+Displacement is quadratic, and pressure linear (Taylor and Hood), continuous within each tissue. The energy is
+that of docs/concepts/physics.md, with pressure p as an unknown of its own:
 
     mu / 2 (J^(-2/3) I1 - 3) + p (J - 1) - p^2 / 2 K
 
-A penalty keeps the skin out of the ball. NGSolve derives forces and stiffness from this energy, and
-Newton's method solves them, first at order 2, from where higher orders go on.
+A penalty keeps the skin out of the ball. NGSolve derives forces and stiffness from this energy, and Newton's
+method solves them.
 """
 
 import sys
@@ -66,12 +66,12 @@ def solid(mesh: Mesh):
 class Body:
     """Unknowns and energy on a mesh of NGSolve; `laws` are mu and K of each tissue, MPa."""
 
-    def __init__(self, made, laws: dict, order: int, mixed: bool = True) -> None:
+    def __init__(self, made, laws: dict, mixed: bool) -> None:
         rigid = "bone|nail"
         held = {"dirichletx": f"{rigid}|base", "dirichlety": f"{rigid}|middle", "dirichletz": rigid}
-        spaces = [ngs.VectorH1(made, order=order, **held)]
+        spaces = [ngs.VectorH1(made, order=2, **held)]
         if mixed:
-            spaces += [ngs.Compress(ngs.H1(made, order=order - 1, definedon=made.Materials(t))) for t in TISSUES]
+            spaces += [ngs.Compress(ngs.H1(made, order=1, definedon=made.Materials(t))) for t in TISSUES]
         self.made, self.laws, self.mixed = made, laws, mixed
         self.space = ngs.FESpace(spaces) if mixed else spaces[0]
         self.now = ngs.GridFunction(self.space)
@@ -186,28 +186,17 @@ class Body:
         return found[on][..., :3], 1e6 * found[on][..., 3], np.argwhere(on)
 
 
-def press(mesh: Mesh, laws: dict, centre, ball_mm: float, depth_mm: float, order: int, mixed: bool) -> dict:
+def press(mesh: Mesh, laws: dict, centre, ball_mm: float, depth_mm: float, mixed: bool) -> dict:
     """A ball comes from below, from a centre where it touches first: force, and SED at the interface, of the dermis."""
     ngs.ngsglobals.msg_level = 0
     made = solid(mesh)
     volumes = {t: ngs.Integrate(ngs.CF(1), made, definedon=made.Materials(t)) for t in TISSUES}
+    body = Body(made, laws, mixed)
+    body.place(centre + [0, 0, depth_mm], ball_mm)
     iterations = []
-    body = None
-    # A lower order finds where the ball touches.
-    for own in range(2, order + 1):
-        before, body = body, Body(made, laws, own, mixed)
-        print(f"  order {own}: {sum(body.space.FreeDofs())} unknowns", file=sys.stderr, flush=True)
-        if before is not None:
-            (u, ps), (u_before, ps_before) = body.split(body.now), before.split(before.now)
-            u.Set(u_before)
-            if mixed:
-                for tissue, p, p_before in zip(TISSUES, ps, ps_before, strict=True):
-                    p.Set(p_before, definedon=made.Materials(tissue))
-        body.place(centre + [0, 0, depth_mm], ball_mm)
-        for penalty in PENALTIES if before is None else PENALTIES[-3:]:
-            body.penalty.Set(penalty)
-            ends = own == order and penalty == PENALTIES[-1]
-            iterations.append(body.solve(depth_mm, ENOUGH if ends else ENOUGH_BEFORE))
+    for penalty in PENALTIES:
+        body.penalty.Set(penalty)
+        iterations.append(body.solve(depth_mm, ENOUGH if penalty == PENALTIES[-1] else ENOUGH_BEFORE))
     places, sed, on = body.sed(mesh.faces["interface"], mesh.tets[mesh.tissue == 1], "dermis")
     corners = mesh.tets[mesh.tissue == 1][on[:, 0]]
     a, b, c = (mesh.places[corners[np.arange(len(on)), np.array(SIDES)[on[:, 1], k]]] for k in range(3))
