@@ -32,7 +32,7 @@ class Feel:
 
     def __init__(self, *, bundle: str | os.PathLike[str] | None = None, **hello: Any) -> None:
         """`bundle` is a finger's folder, of which the atlas is read; by default that of the wheel's finger."""
-        self._hello = json.dumps({"type": "hello", "version": wire.VERSION, **hello})
+        self._hello = wire.hello(hello)
         self._folder = folder(bundle)
         self._native: _native.Feel
         self.reset()

@@ -262,7 +262,7 @@ class AsyncSession:
         self._wake.set()
 
     def _words(self, hello: dict[str, Any]) -> str:
-        return json.dumps({"type": "hello", "version": wire.VERSION, "reconnect": True, **hello})
+        return wire.hello({"reconnect": True, **hello})
 
     async def _connect(self) -> None:
         socket = await self._dial()

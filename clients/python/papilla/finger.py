@@ -206,8 +206,8 @@ class Finger:
         """What presses where points of the skin lie this deep in something, negative outside: a map (224, 224),
         a value a vertex (vertices,), or a batch of either.
 
-        `velocity_mm_per_s` (vertices, 3) goes with depths at vertices and `friction`; `times_s` says when. The
-        rest as `touch`.
+        `velocity_mm_per_s` (vertices, 3) goes with depths at vertices, and needs `friction` and `times_s`: skin rubs
+        by how far it slides from one frame to the next. The rest as `touch`.
         """
         depths = check.numbers(depth_mm, "depth_mm")
         is_map = depths.shape[-2:] == check.SIDE
@@ -223,7 +223,11 @@ class Finger:
         }
         frames = depths.reshape(len(depths) if many else 1, -1)
         parts = [frames]
+        if velocity_mm_per_s is not None and times_s is None:
+            raise BadInput("times_s", "friction goes by how far the skin slides between frames: give their times, in s")
         if friction is not None:
+            if velocity_mm_per_s is None:
+                raise BadInput("friction", "it goes by the sliding of the skin: give velocity_mm_per_s and times_s too")
             terms["friction"] = friction
         if velocity_mm_per_s is not None:
             velocities = check.numbers(velocity_mm_per_s, "velocity_mm_per_s")
@@ -239,7 +243,7 @@ class Finger:
     def _on(self, terms: dict[str, Any]) -> _native.Contact:
         """Contact on these terms: that of the call before, if they are the same."""
         # No network runs here, so no SED is asked for.
-        hello = json.dumps({"type": "hello", "version": wire.VERSION, "map": False, **self._terms, **terms})
+        hello = wire.hello({"map": False, **self._terms, **terms})
         if self._solved is None or hello != self._hello:
             contact = self._native.contact(hello)
             self._told = json.loads(contact.told())

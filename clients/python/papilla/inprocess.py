@@ -113,7 +113,7 @@ class LocalSession(Calls):
         if model is None or tier not in (None, model.tier) or (solves and not model.has_contact):
             model = Model(tier, models=self._models, contact=solves)
         said = {name: value for name, value in hello.items() if name not in _OF_CONNECTIONS}
-        native = model.session({"type": "hello", "version": wire.VERSION, **said})
+        native = model.session(said)
         self._native, self._model, self._hello = native, model, hello
         self._ready: dict[str, Any] = json.loads(native.ready())
         for words in questions(self._ready):

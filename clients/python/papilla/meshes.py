@@ -10,6 +10,7 @@ Needs `papilla[meshes]` (trimesh). What a session takes: docs/reference/protocol
 
 from __future__ import annotations
 
+import json
 from os import PathLike
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -24,6 +25,10 @@ FILES: Final = (".stl", ".obj", ".ply", ".glb", ".gltf")
 TRIANGLES_MAX: Final = 16_384
 """Of one mesh of a session."""
 _ALL_MAX: Final = 32_768
+SHAPE_BYTES_MAX: Final = 496 * 1024
+"""Of a shape as JSON: a hello may have 512 KiB, and holds more than a shape."""
+DECIMALS: Final = 4
+"""Of vertices, which are sent in mm: 0.1 um."""
 _PARTS_MAX: Final = 64
 _SMALL_MM, _LARGE_MM = 0.5, 500.0
 _PAD_MM: Final = (11.25, 0.0, -6.53)
@@ -58,11 +63,7 @@ class Mesh(NamedTuple):
 
     def shape(self) -> dict[str, Any]:
         """The shape of an object of the hello: a mesh, or a union of meshes."""
-        shapes = [
-            {"shape": "mesh", "vertices_mm": np.round(vertices, 6).tolist(), "triangles": triangles.tolist()}
-            for vertices, triangles in self.parts
-        ]
-        return shapes[0] if len(shapes) == 1 else {"shape": "union", "parts": [{"part": each} for each in shapes]}
+        return _shape(self.parts)
 
     def object(self, **more: Any) -> dict[str, Any]:
         """An object of the hello; `more` may be `friction` and `stiffness_mpa_per_mm`."""
@@ -78,8 +79,19 @@ class Mesh(NamedTuple):
         return [_PAD_MM[0] - float(x), -float(y), _PAD_MM[2] - float(high[2]) + depth_mm, 0.0, 0.0, 0.0, 1.0]
 
 
+def _shape(parts: list[tuple[NDArray[np.float64], NDArray[np.int64]]]) -> dict[str, Any]:
+    shapes = [
+        {"shape": "mesh", "vertices_mm": vertices.tolist(), "triangles": triangles.tolist()}
+        for vertices, triangles in parts
+    ]
+    return shapes[0] if len(shapes) == 1 else {"shape": "union", "parts": [{"part": each} for each in shapes]}
+
+
 def load(path: str | PathLike[str], *, unit: str | None = None, triangles_max: int = TRIANGLES_MAX) -> Mesh:
     """Reads a mesh: merges vertices, turns triangles outward, parts bodies, decimates; says so in `notes`.
+
+    Vertices are rounded to 0.1 um. Where so many triangles take more bytes than a hello may have, the mesh is
+    decimated further than to `triangles_max`.
 
     `unit` is mm, cm, m or in. Without it GLB is in metres, as its standard says, and others count as mm; a size
     that looks wrong is then asked about. A surface that is open or crosses itself is sent as it is, with a note:
@@ -113,7 +125,7 @@ def of(vertices_mm: Any, triangles: Any, *, triangles_max: int = TRIANGLES_MAX, 
     if not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
         raise BadMesh("vertices_mm", f"{name}: a vertex is not finite, or a triangle names none that is there")
     notes: list[str] = []
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh = trimesh.Trimesh(np.round(vertices, DECIMALS), faces, process=False)
     before = len(mesh.faces)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
@@ -138,21 +150,38 @@ def of(vertices_mm: Any, triangles: Any, *, triangles_max: int = TRIANGLES_MAX, 
         notes.append("triangles were turned, so that all look outward")
     if len(bodies) > 1:
         notes.append(f"{len(bodies)} separate bodies, sent as the parts of a union")
-    most = min(triangles_max, _ALL_MAX // len(bodies))
     decimated_mm = 0.0
     parts = []
-    for body in bodies:
-        if len(body.faces) > most:
-            fewer = _decimated(body, most, name, not broken)
+    for body, fewer in zip(bodies, _fitting(bodies, triangles_max, name, not broken), strict=True):
+        if fewer is not body:
             distance_mm = _distance_mm(body, fewer)
             decimated_mm = max(decimated_mm, distance_mm)
             notes.append(f"{len(body.faces)} triangles became {len(fewer.faces)}: at most {distance_mm:.3g} mm off")
-            body = fewer
-        crossed = None if broken else _crossed(body)
+        crossed = None if broken else _crossed(fewer)
         if crossed:
             notes.append(f"{crossed}; {_WINDING}")
-        parts.append((np.asarray(body.vertices, np.float64), np.asarray(body.faces, np.int64)))
+        parts.append(_arrays(fewer))
     return Mesh(parts, notes, decimated_mm)
+
+
+def _fitting(bodies: list[Any], triangles_max: int, name: str, closed: bool) -> list[Any]:
+    """The bodies with so few triangles that a hello holds them: as many as come, in their order."""
+    most = min(triangles_max, _ALL_MAX // len(bodies))
+    while True:
+        fitting = [body if len(body.faces) <= most else _decimated(body, most, name, closed) for body in bodies]
+        size = len(json.dumps(_shape([_arrays(body) for body in fitting]), separators=(",", ":")))
+        if size <= SHAPE_BYTES_MAX:
+            return fitting
+        # Of several bodies only the larger ones lose triangles, so that one step may not do.
+        fewest = max(len(body.faces) for body in fitting)
+        most = min(int(0.99 * most * SHAPE_BYTES_MAX / size), fewest - 1)
+        if most < 4:
+            raise BadMesh("path", f"{name} takes {size} bytes; {SHAPE_BYTES_MAX} at most go into a hello")
+
+
+def _arrays(body: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    vertices: NDArray[np.float64] = np.asarray(body.vertices, np.float64).round(DECIMALS)
+    return vertices, np.asarray(body.faces, np.int64)
 
 
 def _trimesh() -> Any:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import check
+from . import check, wire
 from .errors import BadInput, BadModels, NativeMissing
 from .wire import FLAGS, SIDE_PX, Map
 
@@ -137,4 +137,4 @@ class Model:
 
     def session(self, hello: dict[str, Any]) -> _native.Session:
         """A session of the native module; `papilla.local` makes a session for people of it."""
-        return self._native.session(json.dumps(hello))
+        return self._native.session(wire.hello(hello))

@@ -42,6 +42,10 @@ def quantity(name: str) -> Quantity:
     """Unit and meaning of a variable."""
     if name in QUANTITIES:
         return QUANTITIES[name]
+    of_network = name.removeprefix("network_")
+    if of_network in QUANTITIES:
+        unit, about = QUANTITIES[of_network]
+        return Quantity(unit, f"{about}; of the network alone, as if the map of pressure were exact")
     end = max((end for end in _ENDS if name.endswith(end)), key=len)
     source, _, rest = name.partition("_")
     return Quantity(_ENDS[end], f"{rest} of the section {source} of the answer")

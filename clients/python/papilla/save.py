@@ -35,6 +35,7 @@ class Recorded(Protocol):
     ready: dict[str, Any]
     spikes: SpikeTrains | None
     warnings: list[str]
+    about: dict[str, Any]
 
     def __len__(self) -> int: ...
 
@@ -65,6 +66,7 @@ def attributes(series: Recorded) -> dict[str, Any]:
             about[name] = ready[name]
     if "expected_error" in ready:
         about["contact_expected_error"] = json.dumps(ready["expected_error"])
+    about |= series.about
     if series.warnings:
         about["warnings"] = "\n".join(series.warnings)
     return about
@@ -151,17 +153,20 @@ def rows(series: Recorded) -> tuple[list[str], list[list[Any]]]:
 
 def csv(series: Recorded, path: str | PathLike[str]) -> None:
     names, table = rows(series)
-    with whole(path) as there, there.open("w", newline="", encoding="utf-8") as file:
-        writer = csv_files.writer(file)
-        writer.writerow(names)
-        writer.writerows(table)
+    target = Path(path)
+    with whole(target) as there, whole(target.with_name(target.name + ".json")) as beside:
+        with there.open("w", newline="", encoding="utf-8") as file:
+            writer = csv_files.writer(file)
+            writer.writerow(names)
+            writer.writerows(table)
+        beside.write_text(json.dumps(attributes(series), indent=2) + "\n", encoding="utf-8")
 
 
 def nwb(series: Recorded, path: str | PathLike[str], start: datetime | None) -> None:
     if series.times_s is None:
         raise BadInput("times", "an NWB file needs the time of each frame: give times to render")
     try:
-        from pynwb import NWBHDF5IO, NWBFile, TimeSeries
+        from pynwb import NWBHDF5IO, H5DataIO, NWBFile, TimeSeries
     except ImportError as error:
         raise MissingExtra("an NWB file", "nwb") from error
     about = attributes(series)
@@ -173,7 +178,8 @@ def nwb(series: Recorded, path: str | PathLike[str], start: datetime | None) -> 
     module = file.create_processing_module("papilla", "answers of the service")
     for name, array in series.values.items():
         unit, words = quantity(name)
-        module.add(TimeSeries(name=name, data=array, unit=unit, timestamps=series.times_s, description=words))
+        packed = H5DataIO(array, compression="gzip", compression_opts=1) if array.ndim > 1 and array.size else array
+        module.add(TimeSeries(name=name, data=packed, unit=unit, timestamps=series.times_s, description=words))
     bits = "bits: " + ", ".join(f"{bit} {name}" for bit, name in FLAGS.items())
     module.add(TimeSeries(name="flags", data=series.flags, unit="1", timestamps=series.times_s, description=bits))
     if series.spikes is not None:

@@ -80,6 +80,8 @@ class Series:
         """What a person should know; see `Session.warnings`."""
         self.seconds = seconds
         """How long it took."""
+        self.about: dict[str, Any] = {}
+        """What files are to say besides, text and numbers by name."""
 
     def __len__(self) -> int:
         return len(self.flags)
@@ -143,7 +145,10 @@ class Series:
         save.npz(self, path)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Writes a row for each frame: all numbers, and the greatest value of each map."""
+        """Writes a row for each frame: all numbers, and the greatest value of each map.
+
+        What other files have as attributes goes into a JSON file beside it: `a.csv.json` beside `a.csv`.
+        """
         save.csv(self, path)
 
     def to_nwb(self, path: str | PathLike[str], start: datetime | None = None) -> None:

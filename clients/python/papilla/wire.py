@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -178,6 +179,11 @@ FLAGS = {
 }  # fmt: skip
 """Bits of an answer's flags."""
 _NO_FLAGS: Final[frozenset[str]] = frozenset()
+
+
+def hello(terms: Mapping[str, Any]) -> str:
+    """The message of a hello. No blanks: meshes fill what it may have."""
+    return json.dumps({"type": "hello", "version": VERSION, **terms}, separators=(",", ":"))
 
 
 def decode(message: Message) -> Header:

@@ -1,6 +1,9 @@
 """Meshes as they come."""
 
+import json
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -141,6 +144,77 @@ def test_too_many_triangles_are_decimated_and_the_distance_is_stated(url):
     whole = meshes.of(ball(6.0, 4).vertices, ball(6.0, 4).faces)
     pose = whole.under_pad(0.5)
     assert force_n(url, [part.object()], pose) == pytest.approx(force_n(url, [whole.object()], pose), rel=0.05)
+
+
+def test_a_mesh_with_more_triangles_than_a_hello_holds_is_made_to_fit(url, tmp_path):
+    fine = ball(6.0, 6)
+    fine.export(tmp_path / "fine.stl")
+    part = meshes.load(tmp_path / "fine.stl")
+    assert 12_000 < part.triangles <= meshes.TRIANGLES_MAX < len(fine.faces) and 0 < part.decimated_mm < 0.01
+    pose = part.under_pad(0.5)
+    sphere = {"shape": {"shape": "sphere", "radius_mm": 6.0}}
+    assert force_n(url, [part.object()], pose) == pytest.approx(force_n(url, [sphere], pose), rel=0.02)
+    # Coordinates with more digits leave room for fewer triangles.
+    fine.apply_translation([-333.3, -222.2, -111.1])
+    far = meshes.of(fine.vertices, fine.faces)
+    assert 12_000 < far.triangles < part.triangles
+    assert len(json.dumps(far.shape(), separators=(",", ":"))) <= meshes.SHAPE_BYTES_MAX
+    assert force_n(url, [far.object()], far.under_pad(0.5)) == pytest.approx(force_n(url, [sphere], pose), rel=0.02)
+    # So do many bodies, which one by one have few triangles.
+    balls = [ball(2.0, 5).apply_translation([5.0 * i, 0.1234, 0.1234]) for i in range(3)]
+    several = trimesh.util.concatenate(balls)
+    union = meshes.of(several.vertices, several.faces)
+    assert len(json.dumps(union.shape(), separators=(",", ":"))) <= meshes.SHAPE_BYTES_MAX
+    assert force_n(url, [union.object()], union.under_pad(0.3)) > 0.0
+
+
+# Imports nothing but what the extra brings, and what that asks for.
+_ALONE = """
+import importlib.metadata as metadata, re, sys, tomllib
+held = tomllib.load(open("{pyproject}", "rb"))["project"]
+name_of = lambda words: re.match(r"[A-Za-z0-9_.-]+", words)[0].lower().replace("_", "-")
+due = [name_of(words) for words in held["dependencies"] + held["optional-dependencies"]["meshes"]]
+allowed = set()
+while due:
+    name = due.pop()
+    if name not in allowed:
+        allowed.add(name)
+        due += [name_of(words) for words in metadata.requires(name) or [] if "extra ==" not in words]
+owners = metadata.packages_distributions()
+for module, names in owners.items():
+    if not any(name.lower().replace("_", "-") in allowed for name in names) and module != "papilla":
+        sys.modules[module] = None
+assert sys.modules.get("pytest", 1) is None, "nothing was held back"
+import numpy as np, trimesh
+from papilla import meshes
+ball = trimesh.creation.icosphere(subdivisions=4, radius=6)
+faces = ball.faces.copy()
+faces[::2] = faces[::2, ::-1]
+part = meshes.of(ball.vertices, faces, triangles_max=1000)
+assert any("turned" in note for note in part.notes), part.notes
+solid = trimesh.Trimesh(*part.parts[0])
+assert abs(solid.volume / ball.volume - 1) < 0.01, solid.volume
+both = trimesh.util.concatenate([ball, ball.copy().apply_translation([20, 0, 0])])
+assert len(meshes.of(both.vertices, both.faces).parts) == 2
+"""
+
+
+def test_the_extra_brings_all_that_meshes_need():
+    program = _ALONE.format(pyproject=Path(__file__).parents[1] / "pyproject.toml")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_surface_whose_triangles_look_both_ways_is_turned(url, tmp_path):
+    whole = ball()
+    mixed = whole.faces.copy()
+    mixed[::2] = mixed[::2, ::-1]
+    trimesh.Trimesh(whole.vertices, mixed, process=False).export(tmp_path / "mixed.stl")
+    part = meshes.load(tmp_path / "mixed.stl")
+    assert any("turned" in note for note in part.notes)
+    straight = meshes.of(whole.vertices, whole.faces)
+    pose = straight.under_pad(0.4)
+    assert force_n(url, [part.object()], pose) == pytest.approx(force_n(url, [straight.object()], pose), rel=1e-3)
 
 
 def test_files_that_are_none_are_named(tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ import csv
 import json
 import subprocess
 import sys
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -287,14 +288,75 @@ def test_the_command_makes_a_result_of_a_record(url, atlas, tmp_path):
         assert read.sensor_pressure_pa.shape == (8, 224, 224)
         np.testing.assert_allclose(read.summary_force_n, forces, rtol=0.15)
         np.testing.assert_allclose(read.time, 0.02 * np.arange(8))
+        assert read.attrs["sensor_name"] == "glove" and read.attrs["sensor_pitch_mm"] == 2.0
+        due = found["expected_error"]["sed_relative_l2"]
+        assert read.attrs["sensor_expected_error_sed_relative_l2"] == pytest.approx(due)
+        # What is of the network alone is called so, and is not the error to expect of the sensor.
+        assert float(read.network_error_sed_median.max()) < due and "error_sed_median" not in read
+        assert "network alone" in read.network_error_sed_median.long_name
     assert (tmp_path / "result.png").read_bytes()[:4] == b"\x89PNG"
     text = command(tmp_path, url, "--out", "result.csv", "--no-maps")
     assert text.returncode == 0 and "expected error" in text.stdout, text.stderr
     assert len(list(csv.DictReader((tmp_path / "result.csv").open()))) == 8
+    beside = json.loads((tmp_path / "result.csv.json").read_text())
+    assert beside["sensor_expected_error_sed_relative_l2"] == pytest.approx(due) and beside["sensor_pitch_mm"] == 2.0
+
+
+def test_npz_and_nwb_say_what_the_sensor_errs_and_when_it_was(url, atlas, tmp_path):
+    from pynwb import NWBHDF5IO
+
+    write_record(tmp_path, atlas, count=3)
+    lines = (tmp_path / "record.csv").read_text().splitlines()
+    dated = [f"2026-03-01T12:00:00.{20 * i:03},{line.partition(',')[2]}" for i, line in enumerate(lines[1:])]
+    (tmp_path / "record.csv").write_text("\n".join(["# a comment", lines[0], *dated]) + "\n")
+    record = sensors.read_record(tmp_path / "record.csv", columns="t")
+    assert record.start == datetime(2026, 3, 1, 12, tzinfo=UTC) and record.lines == [3, 4, 5]
+    sensor = sensors.describe(tmp_path / "glove.toml", atlas=atlas)
+    felt = sensors.sense(record, sensor, url=url, tier="half-space", maps=False)
+    felt.save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as read:
+        about = json.loads(str(read["about"]))
+    assert about["sensor_expected_error_sa1_relative"] == pytest.approx(felt.expected.sa1_relative)
+    assert "network_error_sed_median" in felt.series.values
+    felt.save(tmp_path / "a.nwb")
+    with NWBHDF5IO(str(tmp_path / "a.nwb"), "r") as file:
+        read = file.read()
+        assert read.session_start_time == record.start and "sensor_expected_error" in read.session_description
+
+
+def columns_of(folder, names, **how):
+    rows = [[20 * row, *(10 * row + int(name[1:]) for name in names)] for row in range(2)]
+    text = [",".join(["time_ms", *names]), *(",".join(map(str, row)) for row in rows)]
+    (folder / "r.csv").write_text("\n".join(text) + "\n")
+    return sensors.read_record(folder / "r.csv", **how)
+
+
+def test_numbered_columns_are_taken_by_their_numbers_or_asked_about(tmp_path):
+    letters = sorted((f"t{i}" for i in range(12)), key=str)
+    with pytest.raises(papilla.BadInput, match=r"'t2' stands after 't11'.*columns = 't'"):
+        columns_of(tmp_path, letters)
+    record = columns_of(tmp_path, letters, columns="t")
+    assert record.names == [f"t{i}" for i in range(12)]
+    np.testing.assert_array_equal(record.readings[1], 10 + np.arange(12))
+    assert columns_of(tmp_path, letters, columns=letters).names == letters
+    assert columns_of(tmp_path, [f"t{i:02}" for i in range(12)]).readings[0, 11] == 11
+    with pytest.raises(papilla.BadInput, match="'t8' stands twice"):
+        columns_of(tmp_path, ["t7", "t8", "t8", "t9"], columns="t")
+    with pytest.raises(papilla.BadInput, match="'t1' stands twice"):
+        columns_of(tmp_path, ["t0", "t1", "t2"], columns=["t0", "t1", "t1"])
 
 
 def replace(name, old, new):
     return lambda folder: (folder / name).write_text((folder / name).read_text().replace(old, new, 1))
+
+
+def gap(folder):
+    """Takes a reading out of the middle."""
+    lines = (folder / "record.csv").read_text().splitlines()
+    cells = lines[2].split(",")
+    cells[25] = ""
+    lines[2] = ",".join(cells)
+    (folder / "record.csv").write_text("\n".join(lines) + "\n")
 
 
 @pytest.mark.parametrize(
@@ -304,6 +366,8 @@ def replace(name, old, new):
         (replace("record.csv", "\n20,", "\n0,"), (), "frame 1"),
         (replace("record.csv", "\n40,", "\nx,"), (), "line 4, column 'time_ms': 'x' is no number"),
         (replace("record.csv", "\n40,", "\n40,9,"), (), "line 4: 58 cells for 57 columns"),
+        (replace("record.csv", "\n20,0.0,", "\n# a comment\n20,0.0,nan,"), (), "line 4: 58 cells"),
+        (gap, (), "line 3, column 't24': there is no reading"),
         (replace("glove.toml", "rows = 8", "rows = 7"), (), "56 taxels, and the sensor 'glove' 49"),
         (replace("glove.toml", "rows", "row"), (), "grid.row"),
         (replace("glove.toml", "pitch_mm = 2.0", ""), (), "grid.pitch_mm"),

@@ -1,6 +1,7 @@
 """A series of frames in one call, and its files."""
 
 import csv
+import json
 import sys
 
 import numpy as np
@@ -233,11 +234,14 @@ def test_files_hold_what_the_series_holds(series, tmp_path):
         read = file.read()
         force = read.processing["papilla"]["summary_force_n"]
         np.testing.assert_array_equal(force.data[:], series["summary_force_n"])
+        assert read.processing["papilla"]["sed_j_per_m3"].data.compression == "gzip"
+        np.testing.assert_array_equal(read.processing["papilla"]["sed_j_per_m3"].data[3], series.sed[3])
         assert force.unit == "N" and sum(len(times) for times in read.units["spike_times"][:]) == len(
             series.spikes.unit
         )
         assert min(times[0] for times in read.units["spike_times"][:] if len(times)) >= series.times_s[0] - 0.01
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.nc", "a.npz", "a.nwb"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.csv.json", "a.nc", "a.npz", "a.nwb"]
+    assert json.loads((tmp_path / "a.csv.json").read_text())["tier"] == "half-space"
 
 
 def test_nothing_is_left_half_written(series, tmp_path, monkeypatch):

@@ -13,6 +13,8 @@ import { vertexMm } from './frames.js';
 
 /** Most triangles of one mesh of a session. */
 export const TRIANGLES_MAX = 16384;
+/** Most bytes of one mesh as JSON: a hello may have 512 KiB, and holds more than a mesh. */
+export const SHAPE_BYTES_MAX = 496 * 1024;
 /** Units of a file, in mm. */
 export const UNITS = /** @type {const} */ ({ mm: 1, cm: 10, m: 1000, in: 25.4 });
 /** A size beyond these is asked about, mm. */
@@ -57,7 +59,16 @@ export async function readMesh(bytes, name, { unit, axes = 'file' } = {}) {
   const factor = factorOf(vertices, ending === 'glb' ? 'm' : 'mm', unit, name);
   const scaled = (/** @type {Three} */ p) => /** @type {Three} */ (p.map((x) => factor * x));
   const turned = (/** @type {Three} */ p) => vertexMm(/** @type {Three} */ (scaled(p).map((x) => x / UNITS.m)));
-  return { shape: 'mesh', vertices_mm: vertices.map(axes === 'scene' ? turned : scaled), triangles };
+  // To 0.1 um: more digits would only fill the hello.
+  const short = (/** @type {Three} */ p) => /** @type {Three} */ (p.map((x) => Math.round(1e4 * x) / 1e4));
+  const placed = axes === 'scene' ? turned : scaled;
+  /** @type {MeshShape} */
+  const shape = { shape: 'mesh', vertices_mm: vertices.map((p) => short(placed(p))), triangles };
+  const size = JSON.stringify(shape).length;
+  if (size > SHAPE_BYTES_MAX) {
+    throw bad(`${name} takes ${size} bytes with its ${triangles.length} triangles; a hello has room for ${SHAPE_BYTES_MAX}: reduce it first`);
+  }
+  return shape;
 }
 
 const bad = (/** @type {string} */ message) => refusal('bad_contact', message);

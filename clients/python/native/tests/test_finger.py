@@ -84,6 +84,11 @@ def test_motion_of_gaps_rubs_as_in_a_session(base):
     # The first frame has no frame before it, so that nothing has moved.
     first, second = np.abs(rubbed.shear_pa[:, :, 0]).sum(axis=1)
     assert second > 10 * first
+    # Without times nothing could rub, and nobody would know.
+    with pytest.raises(papilla.BadInput, match="times_s: friction goes by"):
+        finger.gaps(np.stack([depth_mm] * 2), friction=0.5, velocity_mm_per_s=velocity)
+    with pytest.raises(papilla.BadInput, match="give velocity_mm_per_s"):
+        finger.gaps(np.stack([depth_mm] * 2), friction=0.5, times_s=[0.0, 0.01])
 
 
 def test_a_batch_is_its_frames_and_starts_warm(base):

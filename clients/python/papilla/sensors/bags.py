@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +15,8 @@ from .record import Record, from_zero
 
 Reals = NDArray[np.float64]
 _FILES: Final = (".bag", ".db3", ".mcap")
+_DATES_NS: Final = 10**18
+"""Of 2001; stamps before it are no dates."""
 
 
 def is_bag(path: Path) -> bool:
@@ -60,7 +63,10 @@ def read_bag(path: str | PathLike[str], topic: str | None, *, field: str | None 
             )
     # Nanoseconds of an epoch have more digits than a float.
     times_s = 1e-9 * np.array([stamp - stamps[0] for stamp in stamps], np.float64)
-    return Record(from_zero(times_s), np.stack(readings), [str(i) for i in range(len(readings[0]))])
+    names = [str(i) for i in range(len(readings[0]))]
+    # The clock of a simulation begins near 0.
+    start = datetime.fromtimestamp(1e-9 * stamps[0], UTC) if stamps[0] > _DATES_NS else None
+    return Record(from_zero(times_s), np.stack(readings), names, start)
 
 
 def _stamp_ns(message: Any) -> int:

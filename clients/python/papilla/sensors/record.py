@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,10 @@ class Record(NamedTuple):
     """(frames, taxels)."""
     names: list[str]
     """Of the taxels."""
+    start: datetime | None = None
+    """When the first reading was made, where the record says it."""
+    lines: list[int] | None = None
+    """Line of each frame in a file of text."""
 
 
 def from_zero(times_s: NDArray[np.float64]) -> NDArray[np.float64]:

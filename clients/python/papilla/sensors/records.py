@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import zipfile
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
@@ -41,7 +42,8 @@ def read_record(
     `time` names the column of times; without it one is looked for (`time_s`, `t_ms`, `timestamp` and so on).
     `time_unit` is s, ms, us or ns; without it the end of the name says it. `rate_hz` stands in for times.
     A time may also be a date and time as of ISO 8601, such as 2026-03-01T12:00:00.250.
-    `columns` lists the taxels in their order, or gives what their names begin with; without it all but time.
+    `columns` lists the taxels in their order, or gives what their names begin with, followed by their numbers, by
+    which they are then sorted; without it all columns but time are taken as they stand.
     Of a bag (a folder of ROS 2, .mcap, .db3, .bag) `topic` carries the readings, and `field` is the member of its
     messages that holds them; see `read_bag`. Raises BadInput with line and column.
     """
@@ -58,13 +60,13 @@ def read_record(
         return _npz(file, time or "times_s", time_unit, rate_hz)
     if file.suffix.lower() not in (".csv", ".tsv", ".txt"):
         raise BadInput("record", f"{file.name} is none of .csv, .tsv, .txt, .npz, .mcap, .db3 and .bag")
-    names, values, dated = _table(file)
+    names, values, dated, lines = _table(file)
     at = _time_column(names, time, rate_hz)
-    own = _taxel_columns(names, columns, at)
+    own = _taxel_columns(file, names, columns, at)
     readings = values[:, own]
     missing = np.argwhere(~np.isfinite(readings).any(axis=1))
     if len(missing):
-        raise BadInput("record", f"{file.name}, line {int(missing[0, 0]) + 2}: no taxel has a reading")
+        raise BadInput("record", f"{file.name}, line {lines[int(missing[0, 0])]}: no taxel has a reading")
     if at is None:
         times_s = np.arange(len(values)) / _rate(rate_hz)
     else:
@@ -72,7 +74,8 @@ def read_record(
     for column in own:
         if column in dated:
             raise BadInput("record", f"{file.name}, column '{names[column]}': dates, where readings are due")
-    return Record(from_zero(times_s), readings, [names[i] for i in own])
+    start = _EPOCH + timedelta(seconds=float(times_s[0])) if at in dated else None
+    return Record(from_zero(times_s), readings, [names[i] for i in own], start, lines)
 
 
 def _npz(file: Path, time: str, time_unit: str | None, rate_hz: float | None) -> Record:
@@ -94,13 +97,17 @@ def _npz(file: Path, time: str, time_unit: str | None, rate_hz: float | None) ->
     return Record(from_zero(check.times(times_s, len(readings))), readings, [str(i) for i in range(readings.shape[1])])
 
 
-def _table(file: Path) -> tuple[list[str], NDArray[np.float64], set[int]]:
-    """Names of columns, numbers, and the columns of dates, whose numbers are s; empty cells and `nan` are NaN."""
+def _table(file: Path) -> tuple[list[str], NDArray[np.float64], set[int], list[int]]:
+    """Names of columns, numbers, the columns of dates, whose numbers are s, and the line of each row.
+
+    Empty cells and `nan` are NaN.
+    """
     try:
         text = file.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInput("record", f"{file.name} is no text in UTF-8 ({error})") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    numbered = [(at, line) for at, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    places, lines = [at for at, _ in numbered[1:]], [line for _, line in numbered]
     if len(lines) < 2:
         raise BadInput("record", f"{file.name} needs a header and a line for each moment")
     marks = {mark: lines[0].count(mark) for mark in (",", ";", "\t")}
@@ -112,7 +119,7 @@ def _table(file: Path) -> tuple[list[str], NDArray[np.float64], set[int]]:
     values, dated = np.empty((len(rows) - 1, len(names))), set[int]()
     for number, row in enumerate(rows[1:]):
         if len(row) != len(names):
-            raise BadInput("record", f"{file.name}, line {number + 2}: {len(row)} cells for {len(names)} columns")
+            raise BadInput("record", f"{file.name}, line {places[number]}: {len(row)} cells for {len(names)} columns")
         for column, cell in enumerate(row):
             cell = cell.strip()
             if mark == ";":
@@ -124,10 +131,10 @@ def _table(file: Path) -> tuple[list[str], NDArray[np.float64], set[int]]:
                     values[number, column] = second
                     continue
                 raise BadInput(
-                    "record", f"{file.name}, line {number + 2}, column '{names[column]}': {cell!r} is no number"
+                    "record", f"{file.name}, line {places[number]}, column '{names[column]}': {cell!r} is no number"
                 )
             values[number, column] = float(cell) if cell else math.nan
-    return names, values, dated
+    return names, values, dated, places
 
 
 def _second(text: str) -> float | None:
@@ -175,19 +182,46 @@ def _time_factor(name: str, unit: str | None) -> float:
     return TIME_UNITS[unit]
 
 
-def _taxel_columns(names: list[str], columns: Sequence[str] | str | None, time: int | None) -> list[int]:
-    if columns is None:
-        own = [number for number in range(len(names)) if number != time]
-    elif isinstance(columns, str):
-        own = [number for number, name in enumerate(names) if name.startswith(columns) and number != time]
-    else:
+def _taxel_columns(file: Path, names: list[str], columns: Sequence[str] | str | None, time: int | None) -> list[int]:
+    """Columns in the order of the taxels; raises BadInput where that order is in doubt."""
+    own = [number for number in range(len(names)) if number != time]
+    if isinstance(columns, str):
+        own = [number for number in own if names[number].startswith(columns)]
+        ends = [names[number].removeprefix(columns) for number in own]
+        if all(end.isdecimal() for end in ends):
+            own = [number for _, number in sorted(zip(map(int, ends), own, strict=True))]
+    elif columns is not None:
         missing = [name for name in columns if name not in names]
         if missing:
             raise BadInput("columns", f"no column '{missing[0]}'; there are {', '.join(names[:8])}")
         own = [names.index(name) for name in columns]
     if not own:
         raise BadInput("columns", f"no column of readings among {', '.join(names[:8])}")
+    taken = [names[number] for number in own]
+    twice = [name for name in taken if taken.count(name) > 1 or names.count(name) > 1]
+    if twice:
+        raise BadInput(
+            "columns", f"{file.name}: '{twice[0]}' stands twice; each taxel has a column with a name of its own"
+        )
+    if columns is None:
+        _check_order(file, taken)
     return own
+
+
+def _check_order(file: Path, names: list[str]) -> None:
+    """Raises BadInput for columns that are numbered and not in the order of their numbers."""
+    found = [re.fullmatch(r"(.*?)(\d+)", name) for name in names]
+    stems = {match[1] for match in found if match}
+    if None in found or len(stems) != 1:
+        return
+    numbers = [int(match[2]) for match in found if match]
+    for before, after in zip(range(len(numbers)), range(1, len(numbers)), strict=False):
+        if numbers[after] <= numbers[before]:
+            raise BadInput(
+                "columns",
+                f"{file.name}: '{names[after]}' stands after '{names[before]}', so that it is open which taxel is "
+                f"which: columns = {stems.pop()!r} takes them by their numbers, a list of all names in its own order",
+            )
 
 
 def _rate(rate_hz: float | None) -> float:

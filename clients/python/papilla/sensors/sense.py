@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from datetime import datetime
 from os import PathLike
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -35,14 +36,26 @@ class Sensed(NamedTuple):
     """What a finger felt under a sensor."""
 
     series: Series
-    """With `sensor_reproduction` and, with maps, `sensor_pressure_pa` among its values."""
+    """With `sensor_reproduction` and, with maps, `sensor_pressure_pa` among its values.
+
+    What a `Series` calls `error_sed_median` and so on is `network_error_sed_median` here: it is the error of the
+    network alone, as if the sensor's map of pressure were exact.
+    """
     expected: Expected
     """Errors to expect of such a sensor, against finite elements."""
     warnings: list[str]
+    start: datetime | None = None
+    """When the record began, where it says it."""
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes NetCDF, NPZ, CSV or NWB by the ending of the path."""
-        getattr(self.series, writer(path))(path)
+        """Writes NetCDF, NPZ, CSV or NWB by the ending of the path.
+
+        Sensor, errors to expect of it, and warnings are attributes of the file, those of a CSV a JSON file beside it.
+        """
+        if writer(path) == "to_nwb":
+            self.series.to_nwb(path, self.start)
+        else:
+            getattr(self.series, writer(path))(path)
 
     def summary(self) -> dict[str, Any]:
         """The record in a few numbers, for JSON."""
@@ -105,6 +118,7 @@ def sense(
     if shapes is not None and shapes.shape not in (check.SIDE, (len(record.readings), *check.SIDE)):
         due_shape = f"{check.SIDE} or ({len(record.readings)}, {SIDE_PX}, {SIDE_PX})"
         raise BadInput("prior", f"shape {shapes.shape}; {due_shape} is due")
+    _check_whole(record, sensor)
     pressure = sensor.pascals(record.readings)
     greatest = float(np.nanmax(pressure))
     check.ask_unit(max(greatest, 0.0), "pressure", " of the sensor")
@@ -136,6 +150,7 @@ def sense(
             )
         )
     )  # fmt: skip
+    series.values = {_of_network(name): values for name, values in series.values.items()}
     if maps:
         series.values["sensor_pressure_pa"] = np.concatenate(kept)
     series.values["sensor_reproduction"] = np.concatenate(errors)
@@ -143,7 +158,46 @@ def sense(
     due = expected(sensor.pitch_mm, share)
     warnings = [*series.warnings, *_doubts(record, sensor, series, due)]
     series.warnings = warnings
-    return Sensed(series, due, warnings)
+    series.about = _about(sensor, due)
+    return Sensed(series, due, warnings, record.start)
+
+
+def _check_whole(record: Record, sensor: Taxels) -> None:
+    """Raises BadInput with line and column for a reading that is missing."""
+    bad = np.argwhere(~np.isfinite(record.readings) & sensor.live)
+    if not len(bad):
+        return
+    frame, taxel = (int(i) for i in bad[0])
+    line = "" if record.lines is None else f"line {record.lines[frame]}, "
+    raise BadInput(
+        "record",
+        f"{line}column '{record.names[taxel]}': there is no reading ({len(bad)} such); list taxel {taxel} under dead, "
+        "or leave those moments out",
+        frame,
+    )
+
+
+def _of_network(name: str) -> str:
+    return f"network_{name}" if name.startswith("error_") else name
+
+
+def _about(sensor: Taxels, due: Expected) -> dict[str, Any]:
+    """What files say of the sensor."""
+    found: dict[str, Any] = {
+        "sensor_name": sensor.name,
+        "sensor_taxels": len(sensor),
+        "sensor_pitch_mm": sensor.pitch_mm,
+        "sensor_unit": sensor.unit,
+        "sensor_noise": sensor.noise,
+        "sensor_taxels_beside_the_finger": int(sensor.off.sum()),
+    }
+    found |= {f"sensor_expected_error_{name}": value for name, value in due._asdict().items() if name != "beyond"}
+    found["sensor_expected_error_beyond"] = int(due.beyond)
+    found["sensor_expected_error_about"] = (
+        "medians over test states, of sensor and network together, against finite elements; beyond is 1 where the "
+        "sensor is coarser or noisier than any that was measured. network_error_* are of the network alone"
+    )
+    return found
 
 
 def _of(progress: Progress, total: int) -> Progress:
