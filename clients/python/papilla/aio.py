@@ -9,7 +9,6 @@ from concurrent.futures import Future
 from types import TracebackType
 from typing import Any, Final
 
-import numpy as np
 from numpy.typing import ArrayLike
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus, WebSocketException
@@ -18,8 +17,8 @@ from . import answer as answers
 from . import check, wire
 from .address import Address, clean_token
 from .answer import Answer, Problem
-from .errors import Closed, Refused, Unreachable
-from .http import DEFAULT_URL, refusal
+from .errors import BadInput, Closed, Refused, Unreachable
+from .http import DEFAULT_URL, LOCAL, refusal, without_service
 from .link import Frame, StaysError, Warned, dial, questions, told_beyond, told_refused, told_stays
 from .wire import NetForce, Window
 
@@ -49,6 +48,8 @@ class AsyncSession:
     ) -> None:
         if not timeout_s > 0:
             raise ValueError(f"timeout_s is {timeout_s}; a time above 0 is due, float('inf') for any")
+        if url == LOCAL:
+            raise BadInput("url", f"{LOCAL!r} is this process: papilla.local(...) makes a session in it")
         self._address = Address.parse(url)
         self.url = self._address.http("")
         self.ready: dict[str, Any] = {}
@@ -169,6 +170,7 @@ class AsyncSession:
     ) -> Frame:
         self._check_open()
         samples, window = check.pressure(pressure_pa, window)
+        self._warned.ask_unit(samples, "pressure")
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
         kind = self.ready["sample_type"]
@@ -188,7 +190,7 @@ class AsyncSession:
         `poses` has a row of seven for each: its origin in the finger's frame, mm, and its turn as a
         unit quaternion x y z w. `net` is a net force to be met: a unit vector and N.
         """
-        frame = self.encode_rows("objects", np.atleast_2d(np.asarray(poses, np.float32)), finger, net, client_time_us)
+        frame = self.encode_rows("objects", poses, finger, net, client_time_us)
         self.hand_over(frame)
         return frame.outcome
 
@@ -224,14 +226,16 @@ class AsyncSession:
 
         With `velocity` in the hello, x y z mm/s of each vertex follow the depths.
         """
-        frame = self.encode_rows("gaps", np.atleast_2d(np.asarray(depth_mm, np.float32)), finger, net, client_time_us)
+        frame = self.encode_rows("gaps", depth_mm, finger, net, client_time_us)
         self.hand_over(frame)
         return frame.outcome
 
     def encode_rows(
-        self, kind: str, rows: wire.Map, finger: int, net: NetForce | None, client_time_us: int | None = None
+        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None = None
     ) -> Frame:
         self._check_open()
+        rows = check.rows(kind, values)
+        self._warned.ask_unit(rows, kind)
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
         message = wire.encode_rows(kind, rows, net, finger, self._sequence, time_us)
@@ -243,6 +247,10 @@ class AsyncSession:
         time_us = time.monotonic_ns() // 1000
         message = wire.encode_not_tracked(finger, self._sequence, time_us)
         return Frame(self._sequence, time_us, message, finger)
+
+    def unit_is_known(self) -> None:
+        """Asks no more whether frames are in another unit than Pa or mm."""
+        self._warned.unit_is_known()
 
     def _check_open(self) -> None:
         if self._closed:
@@ -280,7 +288,7 @@ class AsyncSession:
         except InvalidStatus as error:
             raise refusal(bytes(error.response.body or b""), str(error)) from None
         except (OSError, WebSocketException) as error:
-            raise Unreachable(f"{self.url}: {error}; is papilla-server running there?") from error
+            raise Unreachable(f"{self.url}: {error}; is papilla-server running there?{without_service()}") from error
 
     async def _say(
         self, socket: ClientConnection, hello: dict[str, Any], sealed: bytes | None = None
@@ -292,7 +300,7 @@ class AsyncSession:
                 await socket.send(sealed)
             message = json.loads(await asyncio.wait_for(socket.recv(), _PATIENCE_S))
         except (OSError, WebSocketException, TimeoutError) as error:
-            raise Unreachable(f"{self.url}: {error}; is papilla-server running there?") from error
+            raise Unreachable(f"{self.url}: {error}; is papilla-server running there?{without_service()}") from error
         if message["type"] != "ready":
             await socket.close()
             raise Refused(message["code"], message["message"], message.get("field"))

@@ -74,6 +74,9 @@ class Calls(ABC):
         return self._hand_over("gaps", depth_mm, finger, net, client_time_us)
 
     @abstractmethod
+    def unit_is_known(self) -> None: ...
+
+    @abstractmethod
     def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]: ...
 
     def render(

@@ -84,6 +84,9 @@ def _words(bits: int) -> tuple[str, ...]:
     return tuple(name for bit, name in FLAGS.items() if bits & bit)
 
 
+_ANY: Final = {"input": "objects", "objects": [{"shape": {"shape": "sphere"}}]}
+
+
 class Finger:
     """One finger that is touched in this process, with its warm start.
 
@@ -95,8 +98,8 @@ class Finger:
 
         `terms` are members of a session's hello: `method` (such as "pixels" or "second_order"; the most accurate
         that can serve without), `pressure` ("map", the default, "vertices", or None), `shear`, `displacement`,
-        `stiffness`; and `finger`, a member of the hello's `fingers` ({"width": 1.1}). Raises BadInput, BadModels and
-        NativeMissing.
+        `stiffness`; and `finger`, a member of the hello's `fingers` ({"width": 1.1}). Raises BadInput, Refused,
+        BadModels and NativeMissing.
         """
         known = ("method", "pressure", "shear", "displacement", "stiffness", "finger")
         for name in terms:
@@ -118,6 +121,9 @@ class Finger:
         self._hello = ""
         self._told: dict[str, Any] = {}
         self._warned = Warned()
+        if terms or finger is not None:
+            # What cannot be is said now, not at the first touch.
+            self._native.contact(wire.hello({"map": False, **self._terms, **_ANY, "force_target": True}))
 
     @property
     def atlas_hash(self) -> str:
@@ -169,27 +175,27 @@ class Finger:
         times_s: ArrayLike | None = None,
     ) -> FingerContact:
         """What objects at these poses press: a pose (7,) of a single object, (objects, 7), or a batch
-        (frames, objects, 7), mm and a unit quaternion x y z w.
+        (frames, objects, 7), of a single object also (frames, 7), mm and a unit quaternion x y z w.
 
         A solve starts from the one before, as long as the objects are the same; others start cold. `net` is a
-        force that the objects are to press with, as in `Session.touch`. None: tracking is lost. Other threads of
-        Python go on meanwhile, and Ctrl-C ends a batch. Raises BadInput, Refused, and FrameFailed for a frame of
-        a batch.
+        force that the objects are to press with: a unit vector and N, as ([0, 0, 1], 1.0). Poses None: tracking is
+        lost. Other threads of Python go on meanwhile, and Ctrl-C ends a batch. Raises BadInput, Refused, and
+        FrameFailed for a frame of a batch.
         """
-        announced = [objects] if isinstance(objects, Mapping) else list(objects)
+        announced = wire.objects(objects)
         contact = self._on({"input": "objects", "objects": announced, "force_target": True})
         if poses is None:
             return self._read(*contact.lost(), many=False)
-        rows = check.numbers(poses, "poses")
+        rows, said = check.given(poses, "poses", "objects")
         due = (len(announced), 7)
-        if rows.shape == (7,) and len(announced) == 1:
-            rows = rows[None]
+        if len(announced) == 1 and rows.shape[-1:] == (7,) and rows.ndim in (1, 2) and rows.shape != due:
+            # One object: its pose, or a batch of them.
+            rows = rows[..., None, :]
         many = rows.ndim == 3
         if rows.shape[-2:] != due or rows.ndim not in (2, 3):
-            cure = ""
-            if len(announced) == 1 and rows.ndim == 2 and rows.shape[1] == 7:
-                cure = "; for a batch of one object give poses[:, None]"
-            raise BadInput("poses", f"shape {rows.shape}; {due}, or a batch {('frames', *due)} is due{cure}")
+            raise BadInput("poses", f"shape {rows.shape}; {due}, or a batch {('frames', *due)} is due")
+        if not said:
+            self._warned.ask_unit(rows, "objects")
         frames = rows if many else rows[None]
         force = np.broadcast_to(_net(net), (len(frames), 1, 7))
         return self._solve(contact, np.concatenate([frames, force], axis=1), times_s, many)
@@ -209,7 +215,7 @@ class Finger:
         `velocity_mm_per_s` (vertices, 3) goes with depths at vertices, and needs `friction` and `times_s`: skin rubs
         by how far it slides from one frame to the next. The rest as `touch`.
         """
-        depths = check.numbers(depth_mm, "depth_mm")
+        depths, said = check.given(depth_mm, "depth_mm", "gaps")
         is_map = depths.shape[-2:] == check.SIDE
         due = check.SIDE if is_map else (self.vertices,)
         many = depths.ndim == len(due) + 1
@@ -221,6 +227,8 @@ class Finger:
             "input_layout": "map" if is_map else "vertices",
             "force_target": True,
         }
+        if not said:
+            self._warned.ask_unit(depths, "gaps")
         frames = depths.reshape(len(depths) if many else 1, -1)
         parts = [frames]
         if velocity_mm_per_s is not None and times_s is None:
@@ -260,9 +268,12 @@ class Finger:
         if times_s is None:
             times_us = [0] * count
         else:
-            times = check.times(np.atleast_1d(np.asarray(times_s)), count)
+            times = check.times(times_s, count)
             if times[0] < 0.0 if count else False:
                 raise BadInput("times_s", f"{times[0]} s; times count from 0")
+            doubt = check.times_doubt(times)
+            if doubt is not None:
+                self._warned.once("times", doubt)
             times_us = [round(1e6 * float(time)) for time in times]
         samples = np.ascontiguousarray(frames, "<f4")
         # An empty batch has no bytes to lend.
@@ -298,10 +309,7 @@ class Finger:
 
 def _net(net: NetForce | None) -> NDArray[np.float64]:
     """The row of a net force: of no force, none."""
-    if net is None:
-        return np.zeros(7)
-    direction, force_n = net
-    return np.array([*direction, force_n, 0.0, 0.0, 0.0])
+    return np.zeros(7) if net is None else np.array(wire.net_row(net))
 
 
 class Hand:

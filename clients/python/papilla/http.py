@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import urllib.error
 import urllib.parse
 import urllib.request
+from functools import lru_cache
+from importlib.util import find_spec
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -14,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from . import check
 from .address import Address, clean_token
-from .errors import Refused, Unreachable
+from .errors import BadInput, Refused, Unreachable
+from .model import MODELS_VARIABLE, Model
 from .wire import SIDE_PX, WHOLE, Map
 
 DEFAULT_URL: Final = "http://127.0.0.1:7224"
@@ -52,6 +56,8 @@ def request(
     timeout_s: float = 30.0,
 ) -> tuple[bytes, dict[str, str]]:
     """Body and headers of an answer; raises BadAddress, Refused or Unreachable."""
+    if url == LOCAL:
+        raise BadInput("url", f"{LOCAL!r} is this process, which has no {path}: give the address of a service")
     headers = {"accept": accept}
     if body is not None:
         headers["content-type"] = _NPY
@@ -64,7 +70,17 @@ def request(
     except urllib.error.HTTPError as error:
         raise refusal(error.read(), f"status {error.code}") from None
     except OSError as error:
-        raise Unreachable(f"{url}: {error}; is papilla-server running there?") from error
+        raise Unreachable(f"{url}: {error}; is papilla-server running there?{without_service()}") from error
+
+
+def without_service() -> str:
+    """What to do without a service, where this installation can compute."""
+    if find_spec("papilla._native") is None:
+        return ""
+    return (
+        " Here it can be done without: with url='local' in papilla.sed, render, Atlas.load and sensors, --url local of "
+        "python -m papilla, or papilla.local() in place of Session this process computes"
+    )
 
 
 def refusal(body: bytes, otherwise: str) -> Refused:
@@ -119,21 +135,41 @@ def sed(
     finger: str | None = None,
     tier: str | None = None,
     budget_us: int | None = None,
+    unit: str | None = None,
     token: str | None = None,
 ) -> Map:
     """SED (J/m3) of one pressure map (Pa), both 224 x 224.
 
     `finger` by name, or the service's default. `tier` by name, or the most accurate that meets `budget_us`, or the
-    default of the finger.
-    Raises BadInput, Refused or Unreachable.
+    default of the finger. `unit` is Pa, kPa or MPa; without it a map that is weak for Pa is asked about, by BadInput.
+    `url="local"` needs no service: this process computes (see `Model`), and takes neither `finger` nor `budget_us`.
+    Raises BadInput, Refused or Unreachable, in this process BadModels and NativeMissing.
     """
+    pressure_pa, said = check.given(pressure_pa, "pressure_pa", "pressure", unit)
+    pressure_pa = check.samples(pressure_pa, WHOLE)
+    if not said:
+        check.ask_unit(check.size_of(pressure_pa, "pressure"), "pressure")
+    if url == LOCAL:
+        for member, value in (("finger", finger), ("budget_us", budget_us)):
+            if value is not None:
+                raise BadInput(member, "a service has it; this process does not: give the address of a service")
+        return _model(tier, os.environ.get(MODELS_VARIABLE)).sed(pressure_pa, unit="Pa")
     return post(pressure_pa, url=url, finger=finger, tier=tier, budget_us=budget_us, token=token).sed
+
+
+@lru_cache(maxsize=4)
+def _model(tier: str | None, models: str | None) -> Model:
+    """A network of this process, read once."""
+    return Model(tier, models=models)
 
 
 def indentation(
     number: int = 0, *, url: str = DEFAULT_URL, finger: str | None = None, token: str | None = None
 ) -> Indentation:
-    """One of the FE indentations that the service ships: input and truth. `finger` by name, or the default one."""
+    """One of the FE indentations that the service ships: input and truth. `finger` by name, or the default one.
+
+    They are the service's: `url="local"` is refused by BadInput.
+    """
     query = "" if finger is None else "?" + urllib.parse.urlencode({"finger": finger})
     name = get_json(url, "/v1/presses" + query, token)["presses"][number]["name"]
     paths = [f"/v1/presses/{number}/{what}{query}" for what in ("pressure", "sed")]

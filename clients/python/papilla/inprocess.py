@@ -146,6 +146,7 @@ class LocalSession(Calls):
         self, pressure_pa: ArrayLike | None, window: Window | None, client_time_us: int | None, deadline_us: int
     ) -> Answer:
         samples, window = check.pressure(pressure_pa, window)
+        self._warned.ask_unit(samples, "pressure")
         with self._lock:
             sequence, time_us = self._next(client_time_us)
             sample_type = self._ready["sample_type"]
@@ -175,7 +176,8 @@ class LocalSession(Calls):
     def _rows(
         self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
     ) -> Answer:
-        rows = np.atleast_2d(np.asarray(values, np.float32))
+        rows = check.rows(kind, values)
+        self._warned.ask_unit(rows, kind)
         with self._lock:
             sequence, time_us = self._next(client_time_us)
             message = wire.encode_rows(kind, rows, net, finger, sequence, time_us)
@@ -213,6 +215,10 @@ class LocalSession(Calls):
             self._warned.once(problem.code, told_refused(problem))
             return number, problem
         return None
+
+    def unit_is_known(self) -> None:
+        """Asks no more whether frames are in another unit than Pa or mm."""
+        self._warned.unit_is_known()
 
     def warn_beyond(self) -> None:
         """Logs once that an answer had the flag `out_of_range`."""

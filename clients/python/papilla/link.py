@@ -9,6 +9,10 @@ import time
 from concurrent.futures import Future
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
+from . import check
 from .answer import Answer, Problem
 
 _SOCKET_BYTES: Final = 512 * 1024
@@ -66,6 +70,7 @@ class Warned:
     def __init__(self) -> None:
         self.words: list[str] = []
         self._codes: set[str] = set()
+        self._asks = True
 
     def once(self, code: str, words: str) -> None:
         """Logs `words`, unless something with this code was told before."""
@@ -73,6 +78,21 @@ class Warned:
             self._codes.add(code)
             self.words.append(words)
             _LOG.warning("%s", words)
+
+    def unit_is_known(self) -> None:
+        """Asks no more about the unit of frames."""
+        self._asks = False
+
+    def ask_unit(self, values: NDArray[np.float32], kind: str) -> None:
+        """Asks once, of the first frame that is not zero, whether its small values are in another unit."""
+        if not self._asks:
+            return
+        greatest = check.size_of(values, kind)
+        if greatest != 0.0:
+            self._asks = False
+            doubt = check.unit_doubt(greatest, kind)
+            if doubt is not None:
+                self.once("unit", f"{doubt}: was {' or '.join(list(check.UNITS[kind])[1:])} meant?")
 
 
 def questions(ready: dict[str, Any]) -> list[str]:

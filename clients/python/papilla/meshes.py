@@ -105,11 +105,14 @@ def load(path: str | PathLike[str], *, unit: str | None = None, triangles_max: i
     if not file.is_file():
         raise BadInput("path", f"{file} does not exist")
     try:
-        read = trimesh.load(file, force="mesh")
+        # Not processed: that drops vertices that are not finite, and their triangles, and says nothing.
+        read = trimesh.load(file, force="mesh", process=False)
     except Exception as error:  # trimesh raises whatever its many readers do.
         raise BadMesh("path", f"{file.name} cannot be read: {error}") from error
     if not isinstance(read, trimesh.Trimesh) or not len(read.faces):
         raise BadMesh("path", f"{file.name} holds no triangles")
+    if not np.isfinite(read.vertices).all():
+        raise BadMesh("path", f"{file.name}: a vertex is not finite")
     vertices = np.asarray(read.vertices, np.float64) * _factor(file, unit, np.asarray(read.vertices, np.float64))
     return of(vertices, np.asarray(read.faces, np.int64), triangles_max=triangles_max, name=file.name)
 

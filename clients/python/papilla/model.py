@@ -108,17 +108,18 @@ class Model:
         """Whether it can find pressure from poses and gaps."""
         return self._native.has_contact
 
-    def sed(self, pressure_pa: ArrayLike, *, threads: int | None = None) -> Map:
+    def sed(self, pressure_pa: ArrayLike, *, unit: str | None = None, threads: int | None = None) -> Map:
         """SED of a map (224, 224) or of a batch (n, 224, 224), J/m3; see `render`."""
-        return self.render(pressure_pa, threads=threads).sed
+        return self.render(pressure_pa, unit=unit, threads=threads).sed
 
-    def render(self, pressure_pa: ArrayLike, *, threads: int | None = None) -> Rendered:
+    def render(self, pressure_pa: ArrayLike, *, unit: str | None = None, threads: int | None = None) -> Rendered:
         """SED of a map (224, 224) or of a batch (n, 224, 224), Pa, with flags.
 
+        `unit` is Pa, kPa or MPa; without it maps that are weak for Pa are asked about, by BadInput.
         A batch is rendered on `threads` threads, by default one for each core; other threads of Python go
         on meanwhile, and Ctrl-C ends it. Raises BadInput with the place of a map that cannot be.
         """
-        array = check.numbers(pressure_pa, "pressure_pa")
+        array, said = check.given(pressure_pa, "pressure_pa", "pressure", unit)
         is_batch = array.ndim == 3
         if array.shape[-2:] != check.SIDE or array.ndim not in (2, 3):
             if is_batch:
@@ -129,6 +130,8 @@ class Model:
         elif threads < 1:
             raise BadInput("threads", f"{threads}; one or more")
         maps = np.ascontiguousarray(array, np.float32)
+        if not said:
+            check.ask_unit(check.size_of(maps, "pressure"), "pressure")
         sed = np.empty_like(maps)
         # Views of one map each, which the threads read and write by themselves.
         batch, room = (maps, sed) if is_batch else (maps[None], sed[None])

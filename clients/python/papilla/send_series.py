@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple, Protocol, TypeAlias, runtime_checkabl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import check
+from . import check, wire
 from .answer import Answer, Problem
 from .errors import BadInput, FrameFailed
 from .rows import Rooms, Rows
@@ -30,7 +30,6 @@ _TOGETHER_MAX: Final = 8
 """Frames that a session in process takes together, so that its threads wait little for Python and end together."""
 _PATIENCE_S: Final = 60.0
 _TRIES: Final = 3
-_SLOW_S: Final = 1.0
 _LOG: Final = logging.getLogger("papilla")
 # Effects of a session that do nothing sensible without times.
 _TIMED: Final = ("relaxation", "spikes")
@@ -55,6 +54,8 @@ class Session(Protocol):
     def send_poses(self, poses: ArrayLike, *, client_time_us: int | None) -> Future[Answer]: ...
 
     def send_gaps(self, depth_mm: ArrayLike, *, client_time_us: int | None) -> Future[Answer]: ...
+
+    def unit_is_known(self) -> None: ...
 
 
 @runtime_checkable
@@ -97,7 +98,7 @@ class Terms(NamedTuple):
             raise BadInput("budget_us", "a series waits for every frame: name a tier in place of a budget")
         shape: tuple[int, ...] = (SIDE_PX, SIDE_PX)
         if kind == "objects":
-            shape = (len(hello["objects"]), 7)
+            shape = (len(wire.objects(hello["objects"])), 7)
         elif vertices:
             shape = (wide * int(ready["vertices"]),)
         timed = tuple(name for name in _TIMED if name in effects) + (("velocity",) if hello.get("velocity") else ())
@@ -121,8 +122,10 @@ class Source:
 
     def __init__(self, frames: Any, times: ArrayLike | None, unit: str | None, terms: Terms) -> None:
         self.terms = terms
-        self._factor = check.unit_factor(unit, terms.kind)
-        self._ask = unit is None
+        self._unit = unit
+        said = check.unit_of(frames, "frames", terms.kind, unit)
+        self._factor = check.unit_factor(said, terms.kind)
+        self._ask = said is None
         self.count: int | None = len(frames) if hasattr(frames, "__len__") else None
         if hasattr(frames, "__array__") or isinstance(frames, (list, tuple)):
             frames = check.numbers(frames, "frames")
@@ -137,12 +140,10 @@ class Source:
             raise BadInput("frames", "there are none")
         self.notes: list[str] = []
         """Questions about what is right as it stands, and yet odd."""
-        if self.times_s is not None and len(self.times_s) > 2 and np.median(np.diff(self.times_s)) >= _SLOW_S:
-            step = f"{np.median(np.diff(self.times_s)):g}"
-            self.notes.append(
-                f"times: half of the frames are {step} s apart or more; were ms or numbers of frames meant?"
-            )
-            _LOG.warning("%s", self.notes[-1])
+        doubt = None if self.times_s is None else check.times_doubt(self.times_s)
+        if doubt is not None:
+            self.notes.append(doubt)
+            _LOG.warning("%s", doubt)
         self._looked_at = isinstance(frames, np.ndarray)
         if isinstance(frames, np.ndarray):
             # All of it before the first frame leaves, and not once more when it does.
@@ -168,6 +169,8 @@ class Source:
                 raise BadInput("times", f"there are {len(self.times_s)}, and more frames than that")
             factor = self._factor
             if not self._looked_at:
+                said = check.unit_of(values, "frames", self.terms.kind, self._unit)
+                factor, self._ask = check.unit_factor(said, self.terms.kind), self._ask and said is None
                 values, factor = check.frame(values, self.terms.shape, self.terms.kind, number, factor), 1.0
             # Stills all have the same time, so that nothing counts as motion.
             time_us = 0
@@ -327,6 +330,7 @@ def parts(sessions: Sequence[Session], source: Source, chunk: int, progress: Pro
     try:
         for session in sessions:
             session.timeout_s = max(session.timeout_s, _PATIENCE_S)
+            session.unit_is_known()
         while frames := source.take(chunk):
             yield _work(sessions, frames, source, meter)
     finally:

@@ -9,7 +9,6 @@ from concurrent.futures import Future
 from types import TracebackType
 from typing import Any, TypeVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from .aio import TIMEOUT_S, AsyncSession
@@ -122,6 +121,10 @@ class Session(Calls):
             self._loop.call_soon_threadsafe(self._session.hand_over, frame)
         return frame.outcome
 
+    def unit_is_known(self) -> None:
+        """Asks no more whether frames are in another unit than Pa or mm."""
+        self._session.unit_is_known()
+
     @property
     def hello(self) -> dict[str, Any]:
         """The terms that this session asked for last."""
@@ -130,9 +133,8 @@ class Session(Calls):
     def _hand_over(
         self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
     ) -> Future[Answer]:
-        rows = np.atleast_2d(np.asarray(values, np.float32))
         with self._lock:
-            frame = self._session.encode_rows(kind, rows, finger, net, client_time_us)
+            frame = self._session.encode_rows(kind, values, finger, net, client_time_us)
             self._loop.call_soon_threadsafe(self._session.hand_over, frame)
         return frame.outcome
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import BadFrame
+from .errors import BadFrame, BadInput
 
 VERSION: Final = 3
 """Version of the protocol, in hello and frames."""
@@ -41,6 +42,7 @@ _SAMPLES: Final[dict[str, tuple[int, str, float]]] = {
     "u16": (2, "<u2", 65535.0),
     "u8": (3, "u1", 255.0),
 }
+_F16_MAX: Final = 65504.0
 _NAMES: Final = {number: name for name, (number, _, _) in _SAMPLES.items()}
 SEALED: Final = b"PPS"
 """What a sealed state begins with, as opposed to a frame."""
@@ -125,8 +127,11 @@ def parts(
         scale = float(np.float32(float(np.max(pressure_pa)) / unit_max)) or 1.0
         with np.errstate(invalid="ignore"):
             samples = np.clip(np.rint(pressure_pa / scale), 0.0, unit_max).astype(dtype)
-    elif sample_type == "f16":
-        samples = np.clip(pressure_pa, -65504.0, 65504.0).astype(dtype)
+    elif sample_type == "f16" and pressure_pa.size and (greatest := float(np.max(np.abs(pressure_pa)))) > _F16_MAX:
+        cure = "give the hello sample_type='f32'"
+        raise BadInput(
+            "pressure_pa", f"the frame's greatest value is {greatest:g}, and f16 ends at {_F16_MAX:g}: {cure}"
+        )
     else:
         samples = pressure_pa.astype(dtype, copy=False)
     return _head(1, number, sequence, window, client_time_us, deadline_us, scale), samples
@@ -160,10 +165,23 @@ def encode_rows(
     height, width = rows.shape
     samples = rows.astype("<f4").tobytes()
     if net is not None:
-        samples += np.array([*net[0], net[1], 0.0, 0.0, 0.0], "<f4").tobytes()
+        samples += np.array(net_row(net), "<f4").tobytes()
         height += kind == "objects"
     window = (0, 0, width, height)
     return _head(INPUTS[kind], 0, sequence, window, client_time_us, 0, 1.0, finger=finger) + samples
+
+
+def net_row(net: NetForce) -> list[float]:
+    """The row of a net force; raises BadInput for what is none."""
+    try:
+        direction, force_n = net
+        row = [*map(float, direction), float(force_n), 0.0, 0.0, 0.0]
+    except (TypeError, ValueError):
+        row = []
+    if len(row) != 7 or isinstance(net, Mapping):
+        due = "a unit vector in the finger's frame and N along it are due, as ([0, 0, 1], 1.0)"
+        raise BadInput("net", f"{net!r}; {due}")
+    return row
 
 
 def encode_not_tracked(finger: int, sequence: int, client_time_us: int) -> bytes:
@@ -182,8 +200,39 @@ _NO_FLAGS: Final[frozenset[str]] = frozenset()
 
 
 def hello(terms: Mapping[str, Any]) -> str:
-    """The message of a hello. No blanks: meshes fill what it may have."""
-    return json.dumps({"type": "hello", "version": VERSION, **terms}, separators=(",", ":"))
+    """The message of a hello; raises BadInput for what no message holds. No blanks: meshes fill what it may have."""
+    said = {"type": "hello", "version": VERSION, **terms}
+    if "objects" in said:
+        said["objects"] = objects(said["objects"])
+    try:
+        return json.dumps(said, separators=(",", ":"), allow_nan=False)
+    except ValueError as error:
+        raise BadInput(next(_unsound(said, ""), "hello"), "a finite number is due") from error
+    except TypeError as error:
+        raise BadInput("hello", f"{error}; numbers, text, lists and dicts are due") from error
+
+
+def objects(announced: Any) -> list[Any]:
+    """The objects of a hello as a list, of a single one too; raises BadInput for a shape in place of an object."""
+    found = [announced] if isinstance(announced, Mapping) else list(announced)
+    for number, each in enumerate(found):
+        if isinstance(each, Mapping) and isinstance(each.get("shape"), str):
+            raise BadInput(
+                f"objects[{number}]", f"this is a shape, and an object has one: give {{'shape': {dict(each)!r:.200}}}"
+            )
+    return found
+
+
+def _unsound(value: Any, at: str) -> Iterator[str]:
+    """Where numbers are that are not finite."""
+    if isinstance(value, Mapping):
+        for name, member in value.items():
+            yield from _unsound(member, f"{at}.{name}" if at else str(name))
+    elif isinstance(value, list | tuple):
+        for number, member in enumerate(value):
+            yield from _unsound(member, f"{at}[{number}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield at
 
 
 def decode(message: Message) -> Header:

@@ -191,6 +191,38 @@ def test_numbers_that_no_frame_can_hold_are_named():
         wire.encode(whole, wire.WHOLE, "f32", 1, -1, 0)
 
 
+def test_what_no_message_holds_is_named(url):
+    ball = {"shape": "sphere", "radius_mm": 10}
+    with pytest.raises(papilla.BadInput, match=r"objects\[0\]: this is a shape"):
+        papilla.Session(url, input="objects", objects=[ball])
+    with pytest.raises(papilla.BadInput, match=r"objects\[0\].shape.radius_mm: a finite number"):
+        papilla.Session(url, input="objects", objects=[{"shape": ball | {"radius_mm": float("nan")}}])
+    pose = [11.25, 0, -16.2, 0, 0, 0, 1]
+    with papilla.Session(url, input="objects", objects={"shape": ball}, map=False, force_target=True) as session:
+        assert session.touch(pose, net=([0, 0, 1], 0.5)).touch.force_n[2] == pytest.approx(0.5, rel=0.05)
+        for net in ({"direction": [0, 0, 1], "force_n": 1}, [0, 0, 1], ([0, 1], 1.0), 1.0):
+            with pytest.raises(papilla.BadInput, match=r"net: .*as \(\[0, 0, 1\], 1\.0\)"):
+                session.touch(pose, net=net)
+    with papilla.Session(url, sample_type="f16") as session:
+        assert session.render(bump(6e4)).status == "ok"
+        with pytest.raises(papilla.BadInput, match=r"greatest value is 80000, and f16 ends at 65504.*'f32'"):
+            session.render(np.full((224, 224), 8e4))
+
+
+def test_what_needs_a_service_says_so(monkeypatch):
+    with pytest.raises(papilla.BadInput, match=r"papilla\.local"):
+        papilla.Session("local")
+    with pytest.raises(papilla.BadInput, match="no /v1/presses: give the address of a service"):
+        papilla.indentation(url="local")
+    for there in (None, object()):
+        monkeypatch.setattr("papilla.http.find_spec", lambda _, there=there: there)
+        for call in (papilla.Session, lambda url: papilla.sed(bump(), url=url), papilla.Atlas.load):
+            with pytest.raises(papilla.Unreachable, match="is papilla-server running there") as refused:
+                call("127.0.0.1:9")
+            # Only where this process could compute.
+            assert ("url='local'" in str(refused.value)) == (there is not None)
+
+
 def test_sed_is_sed_and_rates_are_rates():
     """Units of u16: each has a scale of its own; what is not there is a named error."""
     head = wire.HEADER.pack(b"PPL1", 3, 2, 2, 0, 7, 2, 1, 5, 9, 2.0, 3, 4, 0, 0, 0, 96, 0)

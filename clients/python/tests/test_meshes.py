@@ -225,6 +225,15 @@ def test_files_that_are_none_are_named(tmp_path, monkeypatch):
         meshes.load(tmp_path / "a.step")
     with pytest.raises(papilla.BadInput, match="does not exist"):
         meshes.load(tmp_path / "b.stl")
+    whole = ball()
+    spoilt = whole.vertices.copy()
+    spoilt[5] = np.nan
+    lines = [f"{x:f} {y:f} {z:f}" for x, y, z in spoilt] + [f"3 {a} {b} {c}" for a, b, c in whole.faces]
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(spoilt)}\n" + "".join(f"property float {x}\n" for x in "xyz")
+    head += f"element face {len(whole.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "nan.ply").write_text(head + "\n".join(lines) + "\n")
+    with pytest.raises(meshes.BadMesh, match="a vertex is not finite"):
+        meshes.load(tmp_path / "nan.ply")
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(papilla.MissingExtra, match=r"papilla\[meshes\]"):
         meshes.load(tmp_path / "a.stl")

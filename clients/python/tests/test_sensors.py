@@ -324,6 +324,22 @@ def test_npz_and_nwb_say_what_the_sensor_errs_and_when_it_was(url, atlas, tmp_pa
         assert read.session_start_time == record.start and "sensor_expected_error" in read.session_description
 
 
+def test_an_array_that_faces_away_is_told_of_its_place_first(url, atlas, tmp_path):
+    write_record(tmp_path, atlas, bad=replace("glove.toml", "[grid]", "[grid]\nquaternion = [1, 0, 0, 0]"))
+    done = command(tmp_path, url, "--json")
+    assert done.returncode == 1 and "taxels lie beside the finger, and the greatest reading is theirs" in done.stderr
+    assert "quaternion" in done.stderr and "unit='kPa'" not in done.stderr
+
+
+def test_readings_in_another_unit_than_the_sensor_are_refused(atlas, grid):
+    import xarray
+
+    readings = np.zeros((2, *grid.shape))
+    assert grid.pressure(xarray.DataArray(readings, attrs={"units": grid.unit})).shape == (2, 224, 224)
+    with pytest.raises(papilla.BadInput, match="the unit 'MPa', the sensor's is 'kPa'"):
+        grid.pressure(xarray.DataArray(readings, attrs={"units": "MPa"}))
+
+
 def columns_of(folder, names, **how):
     rows = [[20 * row, *(10 * row + int(name[1:]) for name in names)] for row in range(2)]
     text = [",".join(["time_ms", *names]), *(",".join(map(str, row)) for row in rows)]
@@ -402,6 +418,12 @@ def test_expected_errors_grow_with_pitch_and_noise():
     fine, coarse, noisy = sensors.expected(1.0, 0.0), sensors.expected(4.0, 0.0), sensors.expected(1.0, 0.05)
     assert fine.sed_relative_l2 < noisy.sed_relative_l2 < coarse.sed_relative_l2 and not coarse.beyond
     assert sensors.expected(8.0, 0.0).beyond and sensors.expected(1.5, 0.01).sed_relative_l2 > fine.sed_relative_l2
+
+
+@pytest.mark.parametrize("given", [(-1, 0), (0, 0), (np.nan, 0), (2, -1), (2, np.nan), ("2", 0)])
+def test_no_errors_are_expected_of_what_no_sensor_is(given):
+    with pytest.raises(papilla.BadInput, match="is due"):
+        sensors.expected(*given)
 
 
 def test_the_packages_are_loaded_when_they_are_named():

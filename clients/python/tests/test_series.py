@@ -93,6 +93,12 @@ def test_gaps_and_pressure_at_vertices(url):
     assert force_n[0] == pytest.approx(force_n[1], rel=1e-3)
 
 
+def test_poses_of_one_object_may_come_one_by_one(url):
+    hello = {"input": "objects", "objects": [BALL], "map": False}
+    whole, single = papilla.render(poses(), url=url, **hello), papilla.render(iter(poses()), url=url, **hello)
+    np.testing.assert_array_equal(single.force_n, whole.force_n)
+
+
 def test_a_series_in_chunks_is_the_series(url):
     times_s = 0.01 * np.arange(12)
     terms = {"url": url, "tier": "half-space", "effects": ["spikes", "summary"], "map": False}
@@ -161,6 +167,64 @@ def test_small_values_are_taken_where_their_unit_is_said(url):
     assert len(papilla.render(1e-3 * ramp(), unit="Pa", url=url, tier="half-space")) == 12
     slow = papilla.render(ramp(), np.arange(12), url=url, tier="half-space")
     assert any("were ms" in words for words in slow.warnings)
+
+
+def labelled(values, dims, **attributes):
+    import xarray
+
+    return xarray.DataArray(values, dims=dims, attrs=attributes)
+
+
+def test_arrays_with_named_axes_and_units_are_read_by_them(url):
+    due = papilla.render(ramp(), 0.01 * np.arange(12), url=url, tier="half-space", effects=["afferents"])
+    turned = labelled(1e-3 * np.moveaxis(ramp(), 0, 2).swapaxes(0, 1), ("column", "row", "time"), units="kPa")
+    times = labelled(10.0 * np.arange(12), ("time",), units="ms")
+    read = papilla.render(turned, times, url=url, tier="half-space", effects=["afferents"])
+    np.testing.assert_allclose(read.sed, due.sed, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(read.times_s, due.times_s)
+    # The same of a frame, of frames that come one by one, and of poses.
+    one = labelled(1e-3 * bump().T, ("column", "row"), units="kPa")
+    np.testing.assert_allclose(papilla.sed(one, url=url), papilla.sed(bump(), url=url), rtol=1e-4, atol=1e-4)
+    with papilla.Session(url) as session:
+        np.testing.assert_allclose(session.render(one).sed, session.render(bump()).sed, rtol=1e-4, atol=1e-4)
+        assert session.warnings == []
+    assert papilla.render((one for _ in range(2)), url=url, tier="half-space").sed.shape == (2, 224, 224)
+    in_m = labelled(poses() * np.array([1e-3] * 3 + [1.0] * 4), ("frame", "pose"), units="m")
+    hello = {"input": "objects", "objects": BALL, "map": False}
+    np.testing.assert_allclose(
+        papilla.render(in_m, url=url, **hello).force_n, papilla.render(poses(), url=url, **hello).force_n, rtol=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "more", "words"),
+    [
+        (lambda: labelled(bump(), ("row", "column"), units="psi"), {}, "the unit 'psi', none of Pa"),
+        (lambda: labelled(bump(), ("row", "column"), units="Pa"), {"unit": "kPa"}, "own attribute says 'Pa'"),
+        (lambda: np.ma.masked_less(bump(), 1.0), {}, r"values are masked: give \.filled"),
+        (lambda: 1e-3 * bump(), {}, "unit='kPa'"),
+    ],
+)
+def test_values_that_mean_something_else_are_named(url, values, more, words):
+    with pytest.raises(papilla.BadInput, match=words):
+        papilla.sed(values(), url=url, **more)
+    with pytest.raises(papilla.BadInput, match=words):
+        papilla.render((values() for _ in range(2)), url=url, **more)
+
+
+def test_a_session_asks_once_whether_small_values_are_in_another_unit(url):
+    with papilla.Session(url, tier="half-space") as session:
+        session.render(np.zeros((224, 224)))
+        assert session.warnings == []
+        for _ in range(2):
+            assert session.render(1e-3 * bump()).status == "ok"
+        assert session.warnings == ["the greatest value is 10, which is little for Pa: was kPa or MPa meant?"]
+    with papilla.Session(url, input="objects", objects=[BALL], map=False) as session:
+        session.touch([0.01125, 0, -0.0162, 0, 0, 0, 1])
+        assert session.warnings[0] == "the greatest value is 0.0162, which is little for mm: was m meant?"
+    with papilla.Session(url, tier="half-space") as session:
+        session.series(1e-3 * ramp(), unit="Pa")
+        assert session.warnings == []
 
 
 @pytest.mark.parametrize(

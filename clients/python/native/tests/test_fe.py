@@ -236,6 +236,12 @@ def test_a_scene_that_cannot_be_says_where():
     assert bad.value.field == "motion.offset_mm"
 
 
+def test_a_number_that_is_none_is_named():
+    with pytest.raises(papilla.BadScene, match=r"indenter\.radius_mm: nan") as refused:
+        papilla.fe.Scene({"indenter": {"kind": "sphere", "radius_mm": float("nan")}})
+    assert refused.value.field == "indenter.radius_mm"
+
+
 def test_a_hard_case_is_an_error_with_fields():
     # No depth of a block of 2 mm bears 900 N.
     with pytest.raises(papilla.NotSolved, match="no equilibrium") as failed:

@@ -87,10 +87,14 @@ def test_what_cannot_be_felt_is_said(felt, tmp_path):
         afferents.rates(sed, TIMES_S[::-1])
     with pytest.raises(papilla.BadInput, match="is due"):
         afferents.rates(sed[0], TIMES_S)
-    with pytest.raises(papilla.Refused, match="row 3, column 4") as refused:
-        bad = sed[2].copy()
-        bad[3, 4] = np.nan
-        afferents.Feel(effects=["afferents"]).step(bad)
-    assert refused.value.field == "sed_j_per_m3"
+    bad = sed.copy()
+    bad[2, 3, 4] = np.nan
+    with pytest.raises(papilla.BadInput, match=r"sed_j_per_m3: nan at \[3, 4\]"):
+        afferents.Feel(effects=["afferents"]).step(bad[2])
+    with pytest.raises(papilla.BadInput, match=r"sed_j_per_m3, frame 2: nan at \[3, 4\]"):
+        afferents.rates(bad, TIMES_S)
+    feel = afferents.Feel(effects=["afferents"])
+    feel.series(sed[:4], 10.0 * np.arange(4))
+    assert any("were ms" in words for words in feel.warnings)
     with pytest.raises(papilla.BadModels, match=r"atlas\.json"):
         afferents.rates(sed, TIMES_S, bundle=tmp_path)

@@ -93,6 +93,7 @@ def test_motion_of_gaps_rubs_as_in_a_session(base):
 
 def test_a_batch_is_its_frames_and_starts_warm(base):
     batch = papilla.Finger(base).touch(BALL, POSES[:, None])
+    assert np.array_equal(papilla.Finger(base).touch(BALL, POSES).force_n, batch.force_n)
     finger, cold = papilla.Finger(base), papilla.Finger(base)
     for number, pose in enumerate(POSES):
         one = finger.touch([BALL], pose)
@@ -127,8 +128,17 @@ def test_a_hand_is_its_fingers(base):
 
 def test_what_cannot_be_is_said(base, tmp_path):
     finger = papilla.Finger(base)
-    with pytest.raises(papilla.BadInput, match=r"give poses\[:, None\]"):
-        finger.touch(BALL, POSES)
+    with pytest.raises(papilla.BadInput, match=r"\(2, 7\), or a batch"):
+        finger.touch([BALL, BALL], POSES)
+    for net in ({"direction": [0, 0, 1], "force_n": 1}, [0, 0, 1]):
+        with pytest.raises(papilla.BadInput, match=r"net: .*as \(\[0, 0, 1\], 1\.0\)"):
+            finger.touch(BALL, POSES[0], net=net)
+    with pytest.raises(papilla.BadInput, match=r"objects\[0\]: this is a shape"):
+        finger.touch(BALL["shape"], POSES[0])
+    # Terms are looked at when they are given.
+    for terms, words in (({"method": "pixel"}, "second_order"), ({"finger": {"width": -1}}, "factor")):
+        with pytest.raises(papilla.Refused, match=words):
+            papilla.Finger(base, **terms)
     with pytest.raises(papilla.BadInput, match="real numbers"):
         finger.touch(BALL, "here")
     with pytest.raises(papilla.Refused, match="radius") as refused:
@@ -149,11 +159,22 @@ def test_what_cannot_be_is_said(base, tmp_path):
     with pytest.raises(papilla.BadInput, match="no such term"):
         papilla.Finger(base, tier="small")
     with pytest.raises(papilla.Refused, match="width"):
-        papilla.Finger(base, finger={"width": 9}).touch(BALL, POSES[0])
+        papilla.Finger(base, finger={"width": 9})
     with pytest.raises(papilla.BadModels, match=r"atlas\.json"):
         papilla.Finger(tmp_path)
     # And goes on.
     assert finger.touch(BALL, POSES[3]).force_n[2] > 0.05
+
+
+def test_odd_units_are_asked_about_once(base):
+    finger = papilla.Finger(base)
+    finger.touch(BALL, POSES[0])
+    finger.touch(BALL, np.tile(POSES[0], (3, 1)), times_s=[0, 10, 20])
+    assert finger.warnings == ["times: half of the frames are 10 s apart or more; were ms or numbers of frames meant?"]
+    other = papilla.Finger(base)
+    for _ in range(2):
+        other.touch(BALL, POSES[0] * np.array([1e-3] * 3 + [1.0] * 4))
+    assert len(other.warnings) == 1 and "little for mm: was m meant?" in other.warnings[0]
 
 
 def test_ctrl_c_ends_a_batch(interrupted):

@@ -49,7 +49,19 @@ def test_bad_input_is_named(model, pressure_pa):
         model.sed(np.full((224, 224), "x"))
     with pytest.raises(papilla.BadInput, match="threads"):
         model.sed(pressure_pa, threads=0)
+    with pytest.raises(papilla.BadInput, match="unit='kPa'"):
+        model.sed(1e-3 * pressure_pa)
+    with pytest.raises(papilla.BadInput, match="masked"):
+        model.sed(np.ma.masked_less(pressure_pa, 1.0))
+    np.testing.assert_allclose(model.sed(1e-3 * pressure_pa, unit="kPa"), model.sed(pressure_pa), rtol=1e-4, atol=1e-4)
     assert np.array_equal(model.sed(pressure_pa), model.sed(pressure_pa))
+
+
+def test_the_short_call_needs_no_service(model, pressure_pa):
+    assert np.array_equal(papilla.sed(pressure_pa, url="local", tier="nano"), model.sed(pressure_pa))
+    for member in ("finger", "budget_us"):
+        with pytest.raises(papilla.BadInput, match=f"{member}: a service has it"):
+            papilla.sed(pressure_pa, url="local", **{member: 1})
 
 
 def test_bad_folders_are_named(tmp_path):

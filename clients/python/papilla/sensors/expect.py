@@ -8,6 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import check
+from ..errors import BadInput
+
 
 class Expected(NamedTuple):
     """Median errors against finite elements over test states, of arrays that cover the pad."""
@@ -28,7 +31,14 @@ def table() -> dict[str, Any]:
 
 
 def expected(pitch_mm: float, noise_share: float) -> Expected:
-    """The errors to expect, between measured sensors; `noise_share` is the noise over the greatest reading."""
+    """The errors to expect, between measured sensors; `noise_share` is the noise over the greatest reading.
+
+    Raises BadInput for what is no pitch or no noise.
+    """
+    if check.number(pitch_mm, "pitch_mm", "a distance in mm") <= 0:
+        raise BadInput("pitch_mm", f"{pitch_mm}; a distance above 0 is due")
+    if check.number(noise_share, "noise_share", "a share of the greatest reading") < 0:
+        raise BadInput("noise_share", f"{noise_share}; a share of the greatest reading is due, 0 or above")
     rows = table()["rows"]
     pitches = np.array(sorted({row["pitch_mm"] for row in rows}))
     noises = np.array(sorted({row["noise"] for row in rows}))

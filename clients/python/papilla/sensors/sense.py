@@ -121,6 +121,7 @@ def sense(
     _check_whole(record, sensor)
     pressure = sensor.pascals(record.readings)
     greatest = float(np.nanmax(pressure))
+    _ask_place(record, sensor, greatest)
     check.ask_unit(max(greatest, 0.0), "pressure", " of the sensor")
     names = list(dict.fromkeys(["summary", *effects]))
     if not maps:
@@ -175,6 +176,21 @@ def _check_whole(record: Record, sensor: Taxels) -> None:
         "or leave those moments out",
         frame,
     )
+
+
+def _ask_place(record: Record, sensor: Taxels, greatest: float) -> None:
+    """Raises BadInput where most of an array misses the finger, and what is read is read there."""
+    beside = int(sensor.off.sum())
+    readings = np.abs(record.readings - sensor.offset)
+    missed = float(np.nanmax(readings[:, sensor.off & ~sensor.dead], initial=0.0))
+    felt = float(np.nanmax(readings[:, sensor.live], initial=0.0))
+    if 2 * beside > len(sensor) and missed > felt:
+        raise BadInput(
+            "sensor",
+            f"{beside} of {len(sensor)} taxels lie beside the finger, and the greatest reading is theirs "
+            f"({missed:.3g}, on the finger {felt:.3g}): look at centre_mm, at quaternion (x y z w; not turned, the "
+            "array lies flat under the pad and faces it) and at the unit of lengths, mm",
+        )
 
 
 def _of_network(name: str) -> str:

@@ -218,6 +218,9 @@ class Taxels:
     def pascals(self, readings: ArrayLike) -> Numbers:
         """Readings as mean pressure over each taxel, Pa: (frames, taxels); dead and off ones are NaN."""
         array = check.numbers(readings, "readings").astype(np.float64)
+        written = check.written_unit(readings)
+        if written in UNITS and written != self.unit and (self.gain == 1.0).all() and not self.offset.any():
+            raise BadInput("readings", f"its attribute says the unit {written!r}, the sensor's is {self.unit!r}")
         flat = self._rows(array)
         bad = ~np.isfinite(flat) & self.live
         if bad.any():
