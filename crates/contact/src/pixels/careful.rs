@@ -6,6 +6,7 @@
 //! and by what Anderson's method (J. ACM 12, 1965) makes of the last rounds. A round that is worse
 //! than the best is taken back, and the share becomes smaller.
 
+use super::change::Change;
 use super::smooth::{TERMS, solve};
 
 /// Rounds after the best one that are no better, after which the next one counts as the best, and its
@@ -88,23 +89,15 @@ impl Careful {
         let Self { now, best, others, count, .. } = self;
         now.force.clear();
         now.residual.clear();
-        let (mut change, mut size) = (0.0f32, 0.0f32);
+        let mut change = Change::default();
         for vertex in active.iter().map(|vertex| *vertex as usize) {
             for (start, found) in start.iter().zip(found) {
-                let residual = found[vertex] - start[vertex];
                 now.force.push(start[vertex]);
-                now.residual.push(residual);
-                change += residual.abs();
-                size += found[vertex].abs();
+                now.residual.push(change.count(start[vertex], found[vertex]));
             }
         }
         copy(&mut now.answer, pressure);
-        // Skin that was pushed out of all reach is as far off as can be. NaN must not pass for nothing.
-        let change = match (change, size) {
-            (0.0, 0.0) => 0.0,
-            (_, 0.0) => 1.0,
-            _ => change / size,
-        };
+        let change = change.part();
         let is_better = change < self.best_change;
         if is_better {
             std::mem::swap(best, now);

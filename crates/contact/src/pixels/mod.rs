@@ -34,8 +34,8 @@
 //! and less towards the inside.
 
 mod careful;
+mod change;
 mod convolution;
-
 mod memory;
 mod mirror;
 mod nearby;

@@ -35,6 +35,8 @@ impl PixelContact {
         let Self { skin, window, pressure, held_pa, turns, rubbing, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
         if !window.open(skin, model, solver.near(), view, &mut out.effort) {
+            // No pixel shows what vertices found, if they did.
+            out.quality.settled &= out.touched().is_empty();
             self.reset();
             return Ok(());
         }
@@ -177,7 +179,7 @@ impl PixelContact {
             window.number_cells(skin, [convolution.rows(), convolution.columns()]);
             effort.work += window.opening_work() + convolution.table_work();
         }
-        let Self { skin, window, convolution, bounded, turns, rubbing, .. } = self;
+        let Self { skin, window, convolution, bounded, turns, .. } = self;
         let Self { rest, pressure, of_vertices, .. } = self;
         let size = [convolution.rows(), convolution.columns()];
         window.press_forces(skin, rest);
@@ -190,9 +192,7 @@ impl PixelContact {
             if start.is_some() {
                 pressure[..n].copy_from_slice(&of_vertices[..n]);
             }
-            effort.iterations += 1;
-            window.sum_forces(skin, &pressure[..n], turns.found());
-            rubbing.sum_forces(skin, window, &pressure[..n]);
+            self.end_round(effort);
             return Ok(());
         }
         let gradient = &mut rest[..m];
@@ -211,9 +211,16 @@ impl PixelContact {
         let products = bounded.improve(nearby, gradient, p, VIOLATION_MM, most).products;
         effort.products += products;
         effort.work += (2 + u64::from(products)) * unit;
-        effort.iterations += 1;
-        window.sum_forces(skin, &pressure[..n], turns.found());
-        rubbing.sum_forces(skin, window, &pressure[..n]);
+        self.end_round(effort);
         Ok(())
+    }
+
+    /// Sums what pixels press with under the vertices' hats.
+    fn end_round(&mut self, effort: &mut Effort) {
+        let Self { skin, window, pressure, turns, rubbing, .. } = self;
+        let pressure = &pressure[..window.len()];
+        effort.iterations += 1;
+        window.sum_forces(skin, pressure, turns.found());
+        rubbing.sum_forces(skin, window, pressure);
     }
 }

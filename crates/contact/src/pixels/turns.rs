@@ -2,6 +2,7 @@
 //! frame.
 
 use super::JUMP;
+use super::change::Change;
 
 /// Farthest that a round goes beyond, or stays behind, what it found.
 const SHARE_MAX: f32 = 0.7;
@@ -169,17 +170,14 @@ impl Turns {
 
     /// Moves `force_n` on; returns the change over the sum of forces.
     pub(super) fn take(&mut self, force_n: &mut Vectors) -> f32 {
-        let (mut change, mut size, mut was) = (0.0f32, 0.0f32, 0.0f32);
+        let mut change = Change::default();
         let (mut along, mut square) = (0.0f32, 0.0f32);
         let (mut onward, mut now_square, mut last_square) = (0.0f32, 0.0f32, 0.0f32);
         for (i, force) in force_n.iter().enumerate() {
             let (found, residual) = (&self.found[i], &mut self.residual[i]);
             for vertex in self.active.iter().map(|vertex| *vertex as usize) {
-                let now = found[vertex] - force[vertex];
+                let now = change.count(force[vertex], found[vertex]);
                 let by = now - residual[vertex];
-                change += now.abs();
-                size += found[vertex].abs();
-                was += force[vertex].abs();
                 along += now * by;
                 square += by * by;
                 onward += now * residual[vertex];
@@ -188,15 +186,13 @@ impl Turns {
                 residual[vertex] = now;
             }
         }
-        if size == 0.0 && was > 0.0 {
-            // Skin was pushed out of all reach: half as far, and from there anew.
+        if change.is_out_of_reach() {
+            // Half as far, and from there anew.
             force_n.iter_mut().flatten().for_each(|force| *force *= 0.5);
             self.rounds = 0;
-            return 1.0;
+            return change.part();
         }
         let share = if square > 0.0 { along / square } else { 0.0 };
-        // NaN must not pass for nothing.
-        let change = if size == 0.0 { 0.0 } else { change / size };
         let late = self.late_part(onward / (now_square * last_square).sqrt());
         let (share, taken) = match self.rounds {
             0 => (0.0, 1.0 - FIRST),
@@ -219,7 +215,7 @@ impl Turns {
             }
         }
         self.rounds += 1;
-        change
+        change.part()
     }
 
     /// Part of the residual that a late round takes, by the cosine between its residual and the last one.
