@@ -4,7 +4,7 @@ use std::sync::{Arc, MutexGuard, PoisonError};
 
 use bytes::BytesMut;
 use papilla_proto::{
-    ErrorCode, ErrorEstimate, HEADER_LEN, Hello, MAP_LEN, Problem, SampleType, Warning,
+    ErrorCode, ErrorEstimate, HEADER_LEN, Hello, Problem, SampleType, Warning,
     contact::{ContactMethod, MethodError},
     effects::Section,
     flags,
@@ -17,8 +17,6 @@ use crate::{Bundle, hello};
 pub struct Contact {
     bundle: Arc<Bundle>,
     hand: Hand,
-    /// On a finger of reference stiffness.
-    pressure_pa: Vec<f32>,
     bytes: BytesMut,
 }
 
@@ -56,7 +54,7 @@ impl Contact {
         }
         let mut bytes = BytesMut::new();
         bytes.reserve(hand.sections_len());
-        Ok(Self { bundle: Arc::clone(bundle), hand, pressure_pa: vec![0.0; MAP_LEN], bytes })
+        Ok(Self { bundle: Arc::clone(bundle), hand, bytes })
     }
 
     /// How pressure is found.
@@ -113,15 +111,15 @@ impl Contact {
             let message = format!("the frame has {} bytes, {due} are due", payload.len());
             return Err(Problem::new(ErrorCode::WrongLength, message).at("payload"));
         }
-        let Self { bundle, hand, pressure_pa, bytes } = self;
+        let Self { bundle, hand, bytes } = self;
         bytes.clear();
         let mut finger = only(hand)?;
         let frame = Frame { payload, sample_type: SampleType::F32, scale: 1.0, time_us };
-        let taken = finger.take(frame, Some(pressure_pa))?;
+        let taken = finger.take(frame, None)?;
+        let is_cut_off = bundle.pixels.are_cut_off_in(&finger);
         finger.write(bytes);
         papilla_render::require_finite(bytes)?;
         state_nothing(&finger, bytes);
-        let is_cut_off = bundle.pixels.are_cut_off(pressure_pa, taken.peak_pa);
         let cut_off = if is_cut_off { flags::CUT_OFF } else { 0 };
         Ok(Solved { flags: taken.flags | cut_off, rounds: taken.iterations.unwrap_or(0) })
     }

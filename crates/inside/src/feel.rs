@@ -8,6 +8,7 @@ use papilla_proto::{
     atlas::{Patch, Raster},
     effects::{Drive, Section},
     error::shortened,
+    flags,
     spikes::PlacedUnit,
 };
 use papilla_session_effects as effects;
@@ -21,6 +22,8 @@ pub struct Feel {
     effects: Effects,
     sample_type: SampleType,
     bytes: BytesMut,
+    /// Whether the last answer holds less than a value, which its sample type cannot hold.
+    is_clipped: bool,
 }
 
 impl std::fmt::Debug for Feel {
@@ -65,7 +68,7 @@ impl Feel {
         let sample_type = hello.answer_sample_type.unwrap_or(hello.sample_type);
         let mut bytes = BytesMut::new();
         bytes.reserve(effects.size_hint());
-        Ok(Self { bundle: Arc::clone(bundle), effects, sample_type, bytes })
+        Ok(Self { bundle: Arc::clone(bundle), effects, sample_type, bytes, is_clipped: false })
     }
 
     /// The sections of an answer, each with its place behind the header.
@@ -86,10 +89,11 @@ impl Feel {
         self.sample_type
     }
 
-    /// Bits of flags that tell of the clock.
+    /// Bits of [`papilla_proto::flags`] of the last answer: of the clock, and of values that its sample
+    /// type cannot hold.
     #[must_use]
     pub fn flags(&self) -> u8 {
-        self.effects.clock_flags()
+        self.effects.clock_flags() | if self.is_clipped { flags::OUT_OF_RANGE } else { 0 }
     }
 
     /// Room for a header, and the sections of the last answer behind it.
@@ -119,6 +123,7 @@ impl Feel {
             }
         }
         self.bytes.clear();
+        self.is_clipped = false;
         let time_us = self.effects.time_us(time_us);
         let network = |_: &[f32], _: &mut [f32]| Err(refused("actuators", "it asks the network"));
         self.effects.fit(sed_j_per_m3, network)?;
@@ -127,6 +132,7 @@ impl Feel {
         let written = written.map_err(|error| {
             Problem::new(ErrorCode::Internal, format!("the answer cannot be written: {error}"))
         })?;
+        self.is_clipped = written.is_clipped;
         Ok(written)
     }
 }

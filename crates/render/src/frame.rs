@@ -102,6 +102,9 @@ impl<'a> Rendering<'a> {
             let judged = maps.judge(read.summary, read.range, known.skin, known.input_max);
             flags |= judged.flags;
             touches = !judged.is_zero;
+            if finger.as_ref().is_some_and(|finger| finger.holds_a_body()) {
+                flags &= !flags::NO_CONTACT;
+            }
         } else if finger.as_ref().is_some_and(|finger| known.skin.are_cut_off_in(finger)) {
             // The force lacks what presses beyond the atlas, also where nobody looks at SED.
             flags |= flags::CUT_OFF;

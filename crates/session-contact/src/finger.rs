@@ -357,6 +357,13 @@ impl Finger {
         })
     }
 
+    /// Whether a body in the finger is held on the side from which it came: it touches, even if no force
+    /// was found.
+    #[must_use]
+    pub fn holds_a_body(&self) -> bool {
+        self.form.input != Input::Pressure && self.out.quality.is_held && !self.is_lost
+    }
+
     fn pixels(&self) -> Option<&PixelContact> {
         self.solver.as_ref().and_then(FingerSolver::pixels)
     }
