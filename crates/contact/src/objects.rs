@@ -111,9 +111,9 @@ impl<'a> View<'a> {
         Self { things, length, shift_mm: [0.0; 3], held: &[], back_mm: 0.0, cost, work_max }
     }
 
-    /// The same view of one of its objects.
-    pub(crate) fn only(self, object: &'a Object) -> Self {
-        let things = Things::Objects(std::slice::from_ref(object));
+    /// The same view of some objects.
+    pub(crate) fn only(self, objects: &'a [Object]) -> Self {
+        let things = Things::Objects(objects);
         Self { things, cost: cost(things), ..self }
     }
 
@@ -179,9 +179,9 @@ impl<'a> View<'a> {
                     Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction, object, asked: 0 };
             }
         }
-        // Bodies that are held count with places that they have left: nothing tells what they cover.
+        // Of what is held only the front counts, which all objects that touch it share.
         let (gap_mm, second_mm) = (self.length * nearest.gap_mm, self.length * second_mm);
-        if self.held.is_empty() && may_be_covered(gap_mm, second_mm) {
+        if may_be_covered(gap_mm, second_mm) && self.held(nearest.object).is_none() {
             self.uncovered(objects, p, nearest)
         } else {
             nearest

@@ -5,7 +5,7 @@ use papilla_contact::{
     Arrays, Contact, ContactModel, Displacement, Gaps, Header, Layer, Method, NetForce, Object,
     PixelContact, PixelSkin, PixelSpacing, Settings, Solver,
 };
-use papilla_sdf::{Placement, Sphere};
+use papilla_sdf::{Placement, RoundedPlate, Sphere};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -71,6 +71,19 @@ fn ball(step: u32) -> Object {
     Object::rigid(Arc::new(Sphere { radius_mm: 10.0 }), place)
 }
 
+/// A thin piece upon another one, and a narrow one beside them.
+fn pieces() -> [Object; 3] {
+    let piece = |half_mm: [f64; 3], origin_mm| {
+        let shape = Arc::new(RoundedPlate { half_mm, edge_radius_mm: 0.0 });
+        Object::rigid(shape, Placement::turned(0.0, 0.0, 0.0, origin_mm))
+    };
+    [
+        piece([0.3, 0.5, 0.04], [0.0, 0.0, 0.06]),
+        piece([0.3, 0.5, 0.2], [0.0, 0.0, -0.18]),
+        piece([0.05, 0.5, 0.24], [0.35, 0.0, -0.14]),
+    ]
+}
+
 #[test]
 fn a_warm_frame_takes_no_memory() {
     let (model, mut pixels) = model();
@@ -86,6 +99,7 @@ fn a_warm_frame_takes_no_memory() {
     let mut moved_mm = vec![[0.0; 3]; model.vertices()];
     let objects: Vec<_> = (0..20).map(ball).collect();
     let depth_mm: Vec<f32> = (0..model.vertices()).map(|i| 0.02 - 1e-4 * i as f32).collect();
+    let pieces = pieces();
     let net = NetForce { direction: [0.0, 0.0, 1.0], force_n: 0.005 };
     let mut frame = |object: &Object| {
         solver.solve(std::slice::from_ref(object), &mut out).expect("an answer");
@@ -101,6 +115,8 @@ fn a_warm_frame_takes_no_memory() {
         assert!(out.force_n[2] > 0.0);
         displacement.fill(&solver, Some(&pixels), &out, &mut moved_mm);
         solver.solve_for_force_on_pixels(objects, net, &mut pixels, &mut out).expect("a travel");
+        solver.solve(&pieces, &mut out).expect("an answer");
+        assert!(out.force_n[2] > 0.0);
         solver.solve(&[] as &[Object; 0], &mut out).expect("an answer");
     };
     objects.iter().take(3).for_each(&mut frame);

@@ -4,6 +4,7 @@
 
 mod budget;
 mod deep;
+mod pieces;
 mod support;
 
 use papilla_contact::{Arrays, Contact, Gaps, Header, Object, Settings, Solver};
