@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from .errors import BadInput, PapillaError
 from .http import DEFAULT_URL
@@ -67,7 +68,41 @@ def _parser() -> argparse.ArgumentParser:
     sense.add_argument("--topic", help="topic of a bag of ROS that carries the readings")
     sense.add_argument("--rate-hz", type=float, help="frames a second, for a record without times")
     sense.add_argument("--json", action="store_true", help="print the summary as JSON")
+    sense.set_defaults(run=_sense)
+    _add_scenes(commands)
     return parser
+
+
+def _add_scenes(commands: Any) -> None:
+    words = "what a scene of finite elements would simulate, what it leaves out and why, and what it costs"
+    explain = commands.add_parser("explain", help=words, description=f"Says {words}. Needs Papilla's wheel.")
+    explain.add_argument("scene", type=Path, help="scene file (docs/reference/scenes.md)")
+    explain.add_argument("--json", action="store_true", help="print it as JSON")
+    explain.set_defaults(run=_explain)
+    words = "solves a scene of finite elements"
+    solve = commands.add_parser("solve", help=words, description=f"{words.capitalize()}. Needs Papilla's wheel.")
+    solve.add_argument("scene", type=Path, help="scene file (docs/reference/scenes.md)")
+    solve.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder for the results")
+    solve.add_argument("--no-fields", action="store_true", help="no fields of the whole body (.vtu)")
+    solve.set_defaults(run=_solve)
+
+
+def _explain(options: argparse.Namespace) -> None:
+    from .fe import Scene
+
+    explanation = Scene(options.scene).explain()
+    print(json.dumps(explanation) if options.json else str(explanation))
+
+
+def _solve(options: argparse.Namespace) -> None:
+    from .fe import Scene
+
+    states = Scene(options.scene).run(fields=not options.no_fields, out=options.out, progress=sys.stderr.isatty())
+    for state in states:
+        flags = f", {', '.join(state.flags)}" if state.flags else ""
+        force_n = " ".join(f"{value:.4f}" for value in state.force_n)
+        print(f"state {state.number}: {state.depth_mm:.3f} mm deep, force {force_n} N{flags}")
+    print(f"written to {options.out}")
 
 
 def _sense(options: argparse.Namespace) -> None:
@@ -116,7 +151,7 @@ def _sense(options: argparse.Namespace) -> None:
 def main() -> int:
     options = _parser().parse_args()
     try:
-        _sense(options)
+        options.run(options)
     except PapillaError as error:
         print(f"papilla: {error}", file=sys.stderr)
         return 1

@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,43 @@ def test_states_of_a_finger_are_those_of_the_command_to_the_bit(command, tmp_pat
         assert (tmp_path / "state.vtu").read_bytes() == written and b'"stress_pa"' in written
     assert states[1].force_n[2] > states[0].force_n[2] > 0 and states[1].iterations > 0
     assert states[1].sed_j_per_m3.max() > 0 and states[1].pressure_pa.shape == (224, 224)
+
+
+def test_files_of_a_run_are_those_of_the_command(command, tmp_path):
+    out = command(FINGER)
+    states = fe.Scene(FINGER).run(out=tmp_path / "own")
+    with np.load(out / "maps.npz") as due, np.load(tmp_path / "own/maps.npz") as maps:
+        assert sorted(maps) == sorted(due)
+        for name in due:
+            assert maps[name].dtype == due[name].dtype and maps[name].tobytes() == due[name].tobytes(), name
+    for name in ("series.pvd", "state-000.vtu", "state-001.vtu"):
+        assert (tmp_path / "own" / name).read_bytes() == (out / name).read_bytes(), name
+    summary = json.loads((tmp_path / "own/summary.json").read_text())
+    assert summary["increments"] == [state.summary for state in states] and "ended" not in summary
+    assert summary["scene"] == json.loads((out / "summary.json").read_text())["scene"]
+    # The same from the command line, without fields.
+    (tmp_path / "scene.toml").write_text(FINGER)
+    papilla_command, scene = [sys.executable, "-m", "papilla"], tmp_path / "scene.toml"
+    words = [*papilla_command, "solve", scene, "--out", tmp_path / "line", "--no-fields"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert "state 1: 0.800 mm deep" in done.stdout
+    assert sorted(path.name for path in (tmp_path / "line").iterdir()) == ["maps.npz", "summary.json"]
+    done = subprocess.run([*papilla_command, "explain", scene], capture_output=True, text=True, check=True)
+    # But for the seconds, which it measures.
+    said, due = done.stdout.splitlines(), str(fe.Scene(scene).explain()).splitlines()
+    assert len(said) == len(due) > 10 and said[:10] == due[:10]
+    # A solve that is stopped leaves what it found.
+    (tmp_path / "file").write_text("")
+    with pytest.raises(papilla.BadInput, match="no folder"):
+        fe.Scene(FINGER).run(out=tmp_path / "file")
+
+    def stop(done, *_):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fe.Scene(FINGER).run(out=tmp_path / "part", fields=False, progress=stop)
+    assert json.loads((tmp_path / "part/summary.json").read_text())["ended"] == "stopped"
 
 
 def test_a_map_of_pressure_presses_as_the_indenter_that_it_came_of(command, tmp_path):

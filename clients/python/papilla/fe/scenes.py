@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import check
-from ..errors import BadInput, BadScene
+from ..errors import BadInput, BadScene, PapillaError
 from ..model import native
 from ..wire import SIDE_PX, WHOLE, Map
+from .files import Files
 from .source import Explanation, Source, read
 
 if TYPE_CHECKING:
@@ -235,15 +236,40 @@ class Scene:
         """
         return Solve(self._native.solve(fields), progress)
 
-    def run(self, *, fields: bool = True, progress: Progress = None) -> list[State]:
-        """All states of `solve` that count, in their order."""
+    def run(
+        self, *, fields: bool = True, out: str | os.PathLike[str] | None = None, progress: Progress = None
+    ) -> list[State]:
+        """All states of `solve` that count, in their order.
+
+        With `out`, a folder, what the scene's `outputs` name is written there as `fe-datagen solve` does:
+        `state-000.vtu` and so on with `series.pvd` (not with `fields=False`), `maps.npz`, and `summary.json` with
+        scene and states; no pictures. Where the solve ends early, by an error too, the states before are written.
+        """
         states: dict[int, State] = {}
-        with self.solve(fields=fields, progress=progress) as solve:
-            for state in solve:
-                if state.number == 0:
-                    states.clear()
-                states[state.number] = state
-        return [states[number] for number in sorted(states)]
+        files = None
+        if out is not None:
+            members = self.as_dict()
+            named = members.get("outputs")
+            outputs = ["fields", "maps"] if named is None else named
+            files = Files(out, members, [name for name in outputs if fields or name != "fields"])
+        reason: str | None = "stopped"
+        try:
+            with self.solve(fields=fields, progress=progress) as solve:
+                for state in solve:
+                    if state.number == 0:
+                        states.clear()
+                    states[state.number] = state
+                    if files is not None:
+                        files.take(state)
+            reason = None
+        except PapillaError as error:
+            reason = str(error)
+            raise
+        finally:
+            found = [states[number] for number in sorted(states)]
+            if files is not None:
+                files.finish(found, reason)
+        return found
 
     def effects(self, *, solve: bool = False, progress: Progress = None) -> list[Effect]:
         """What each effect that the scene names costs, and, with `solve`, what it changes.
