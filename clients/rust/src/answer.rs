@@ -1,4 +1,4 @@
-//! What becomes of a frame.
+//! The answer to a frame: its status, its map and the other sections that the hello asked for.
 
 use papilla_proto::{
     ErrorEstimate, FrameHeader, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary, Window,

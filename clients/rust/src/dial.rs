@@ -1,4 +1,4 @@
-//! How a session connects.
+//! Opens the TCP connection of a session, with buffers for whole frames.
 
 use std::io;
 

@@ -1,4 +1,4 @@
-//! What can go wrong.
+//! The error of this client: why there is no session or no map.
 
 use std::fmt::Display;
 

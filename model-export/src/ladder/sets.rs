@@ -1,4 +1,4 @@
-//! The held-out sets.
+//! The held-out sets of the ladder: states that no training saw, on which all rungs are measured.
 
 use super::Canvas;
 use crate::ExportError;

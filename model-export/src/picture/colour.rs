@@ -1,4 +1,4 @@
-//! Colour scales.
+//! The colours of pictures of a sample: numbers from 0 to 1 as red, green and blue.
 
 use papilla_output::canvas::viridis;
 

@@ -1,4 +1,4 @@
-//! The page.
+//! The page of the study of pins: tables of the errors and times of drives.
 
 use super::{Row, Table};
 use papilla_model_export::ladder::machine;

@@ -1,4 +1,4 @@
-//! The lines of the figures.
+//! SED along the lines of the section that the paper's figures show.
 
 use super::WedgeError;
 use papilla_fem::mesh::probe::{Probe, line};

@@ -1,4 +1,4 @@
-//! What a scene makes the solver assemble and store, counted.
+//! Counts what a scene makes the solver assemble and store: fills in its [`Census`].
 
 use crate::scene::effects::Law;
 use crate::scene::{Census, Scene};

@@ -1,4 +1,4 @@
-//! Where a body's fluid may leave.
+//! The table `[biphasic]` of a scene: where the fluid of a body may leave.
 
 use super::error::{SceneError, require};
 use super::materials::TissueTable;

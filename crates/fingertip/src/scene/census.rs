@@ -1,4 +1,5 @@
-//! What a scene makes the solver assemble and store, counted.
+//! The census of a scene: how much of each kind the solver assembles and stores. It is counted in
+//! `forecast/census.rs`; effects name the count that is theirs.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! What is pressed.
+//! The table `[geometry]` of a scene: which body is pressed, and how finely it is meshed.
 
 use super::error::{SceneError, is_length, require};
 use crate::geometry::fingertip::FingertipShape;

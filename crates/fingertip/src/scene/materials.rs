@@ -1,4 +1,4 @@
-//! What each tissue may be made of.
+//! The table `[materials]` of a scene: the constants of each tissue.
 
 use crate::materials::{MaterialError, MaterialSpec, Moduli, OgdenSpec, PronySpec};
 use crate::tissue::Tissue;

@@ -1,4 +1,4 @@
-//! How the indenter moves.
+//! The table `[motion]` of a scene: how the indenter moves, to a depth, to a force or along a path.
 
 use super::error::{SceneError, is_length, require};
 use schemars::JsonSchema;

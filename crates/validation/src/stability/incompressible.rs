@@ -1,4 +1,4 @@
-//! nu = .49 to .49999.
+//! Hard cases of nearly incompressible tissue: Poisson's ratios from 0.49 to 0.49999.
 
 use super::lab::solve;
 use super::{Hardness, Line, Suite};

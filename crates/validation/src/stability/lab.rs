@@ -1,4 +1,4 @@
-//! Solving what the cases describe.
+//! Solves the problems and scenes of the hard cases, and says how each ended.
 
 use super::{Hardness, Line};
 use crate::verify::Check;

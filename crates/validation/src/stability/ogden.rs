@@ -1,4 +1,4 @@
-//! alpha = 25 and negative mu.
+//! Hard cases of Ogden's law: exponents `alpha` up to 25, and negative moduli `mu`.
 
 use super::lab::{press, scene, solve, tight};
 use super::{Hardness, Line, Suite};

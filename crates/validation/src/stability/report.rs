@@ -1,4 +1,4 @@
-//! The table of all lines.
+//! The report of the hard cases: the page `docs/reports/stability.md`, and the table beside it.
 
 use super::line::{comparison, first_line};
 use super::{CASES, End, Extent, Hardness, Line};

@@ -1,4 +1,4 @@
-//! Values in another unit.
+//! Hard cases of input: values in another unit than the scene asks for, which are refused.
 
 use super::lab::scene;
 use super::{Line, Suite};

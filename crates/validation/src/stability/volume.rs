@@ -1,4 +1,4 @@
-//! J from 1 down to .05, and below 0.
+//! Hard cases of compression: bodies squeezed to 0.05 of their volume, and turned inside out.
 
 use super::lab::{solve, tight};
 use super::{Line, Suite};
