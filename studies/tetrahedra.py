@@ -64,7 +64,9 @@ def on_tetrahedra(out: Path, finger: Finger, size_mm: float, options) -> dict:
     """The press by NGSolve. What is solved already is read."""
     mixed = not options.displacement_alone
     kept = out / f"tetrahedra-{size_mm:g}-{options.poisson:g}{'' if mixed else '-alone'}.npz"
-    if not kept.is_file():
+    text = scene(options.finger.resolve(), "none", options.poisson, options.offset)
+    of = read(kept)
+    if of.get("scene") != text:
         before = resource.getrusage(resource.RUSAGE_SELF)
         centre, touch = finger.touch(options.offset, BALL_MM)
         mesh = Mesh(finger, size_mm, touch)
@@ -78,6 +80,7 @@ def on_tetrahedra(out: Path, finger: Finger, size_mm: float, options) -> dict:
         force = found.pop("force_n") * ([0, 0, 2] if finger.symmetric else 1)
         np.savez(
             kept,
+            scene=text,
             s=after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
             elements=len(mesh.tets),
             touch=touch,
@@ -85,10 +88,16 @@ def on_tetrahedra(out: Path, finger: Finger, size_mm: float, options) -> dict:
             volumes=[times * v for v in found.pop("volumes_mm3").values()],
             **found,
         )
-    with np.load(kept) as read:
-        of = {key: read[key] for key in read.files}
+        of = read(kept)
     volumes = dict(zip(TISSUES, of["volumes"], strict=True))
-    return {**of, "force_n": float(np.linalg.norm(of["force"])), "volumes_mm3": volumes}
+    return {**of, "size_mm": size_mm, "force_n": float(np.linalg.norm(of["force"])), "volumes_mm3": volumes}
+
+
+def read(kept: Path) -> dict:
+    if not kept.is_file():
+        return {}
+    with np.load(kept) as of:
+        return {key: of[key] for key in of.files}
 
 
 def sed_differs(own, other, area) -> dict:
@@ -108,13 +117,58 @@ def relative_l2(own, other, area) -> float:
     return np.sqrt((area * (own - other) ** 2).sum() / (area * other**2).sum())
 
 
-def row(name: str, elements: str, of: dict, force: float, sed: dict | None) -> str:
+def row(name: str, elements: str, of: dict, truth: dict, sed: dict | None) -> str:
+    force = 100 * (of["force_n"] / truth["force_n"] - 1)
     text = f"| {name} | {elements} | {int(of['unknowns'])} | {float(of['s']):.0f} | {of['force_n']:.4f} |"
-    text += f" {100 * force:+.2f} % |"
+    text += f" {force:+.2f} % |"
     if sed is None:
         return text + " | | | |"
     text += f" {100 * sed['sed_relative_l2']:.2f} % | {100 * sed['sed_means_relative_l2']:.2f} % |"
     return text + f" {100 * sed['sed_largest']:+.2f} % | {100 * sed['sed_mean']:+.2f} % |"
+
+
+def table_of_presses(hexes: dict, tets: list, truth: dict) -> list:
+    rows = ["| solved by | elements | unknowns | processor time, s | force, N | force: difference |"]
+    rows[0] += " SED at points: L2 | SED of triangles: L2 | SED: largest value | SED: mean |"
+    rows += ["|---" * 10 + "|"]
+    differs = []
+    for of in tets:
+        near = (np.linalg.norm((of["places"] - of["touch"])[:, :2], axis=1) < COMPARED_MM) & (of["places"][:, 2] < 0)
+        near = np.repeat(near.reshape(-1, 3).all(1), 3)
+        places, area = of["places"][near], of["areas"][near]
+        seds = {density: hexahedra.at(hexa, places) for density, hexa in hexes.items()}
+        true = next(seds[density] for density, hexa in hexes.items() if hexa is truth)
+        differs.append({None: sed_differs(of["sed"][near], true, area)})
+        differs[-1].update({density: sed_differs(sed, true, area) for density, sed in seds.items()})
+    for density, of in hexes.items():
+        elements = f"{of['elements']} hexahedra, `{density}`"
+        rows.append(row("`fe-datagen`", elements, of, truth, None if of is truth else differs[-1][density]))
+    for of, sed in zip(tets, differs, strict=True):
+        elements = f"{int(of['elements'])} tetrahedra, {of['size_mm']:g} mm"
+        rows.append(row("NGSolve", elements, of, truth, sed[None]))
+    return rows
+
+
+def table_of_volumes(hexes: dict, tets: list, finger: Finger) -> list:
+    rows = ["| mesh | " + " | ".join(f"{tissue}: volume" for tissue in TISSUES) + " |", "|---" * 4 + "|"]
+    formulas = dict(zip(TISSUES, finger.volumes_mm3(), strict=True))
+    meshes = [(f"hexahedra, `{density}`", of) for density, of in hexes.items()]
+    meshes += [(f"tetrahedra, {of['size_mm']:g} mm", of) for of in tets]
+    for name, of in meshes:
+        parts = (f"{100 * (of['volumes_mm3'][t] / formulas[t] - 1):+.3f} %" for t in TISSUES)
+        rows.append(f"| {name} | " + " | ".join(parts) + " |")
+    return rows
+
+
+def table_of_vertices(truth: dict, finger: Finger) -> list:
+    """How far the vertices of an atlas lie from where the formulas have them."""
+    skin, interface = (np.array(truth["atlas"][name]["positions_mm"]) for name in ("skin", "interface"))
+    bounds = finger.bounds(finger.named(skin))
+    rows = ["| distance of `fe-datagen`'s vertices | nine in ten lie within, nm | farthest, nm |", "|---|---|---|"]
+    for name, own, formula in (("skin", skin, bounds[0]), ("interface", interface, bounds[1])):
+        away = 1e6 * np.linalg.norm(own - formula, axis=1)
+        rows.append(f"| {name} | {np.percentile(away, 90):.1f} | {away.max():.1f} |")
+    return rows
 
 
 def main() -> None:
@@ -137,44 +191,10 @@ def main() -> None:
         text = scene(file, density, options.poisson, options.offset)
         hexes[density] = hexahedra.solved(out / f"hexahedra-{density}-{options.poisson:g}.toml", text)
     truth = hexes[options.density[-1]]
-    found = []
-    for size in options.size:
-        of = on_tetrahedra(out, finger, size, options)
-        near = (np.linalg.norm((of["places"] - of["touch"])[:, :2], axis=1) < COMPARED_MM) & (of["places"][:, 2] < 0)
-        near = np.repeat(near.reshape(-1, 3).all(1), 3)
-        places, area = of["places"][near], of["areas"][near]
-        true = hexahedra.at(truth, places)
-        found.append({
-            **of,
-            "size_mm": size,
-            **sed_differs(of["sed"][near], true, area),
-            "hexahedra": {d: sed_differs(hexahedra.at(h, places), true, area) for d, h in hexes.items()},
-        })
-    rows = ["| solved by | elements | unknowns | processor time, s | force, N | force: difference |"]
-    rows[0] += " SED at points: L2 | SED of triangles: L2 | SED: largest value | SED: mean |"
-    rows += ["|---" * 10 + "|"]
-    for density, of in hexes.items():
-        sed = None if of is truth else found[-1]["hexahedra"][density]
-        elements = f"{of['elements']} hexahedra, `{density}`"
-        rows.append(row("`fe-datagen`", elements, of, of["force_n"] / truth["force_n"] - 1, sed))
-    for of in found:
-        elements = f"{int(of['elements'])} tetrahedra, {of['size_mm']:g} mm"
-        rows.append(row("NGSolve", elements, of, of["force_n"] / truth["force_n"] - 1, of))
-    rows += ["", "| mesh | " + " | ".join(f"{tissue}: volume" for tissue in TISSUES) + " |", "|---" * 4 + "|"]
-    formulas = dict(zip(TISSUES, finger.volumes_mm3(), strict=True))
-    meshes = [(f"hexahedra, `{density}`", of) for density, of in hexes.items()]
-    meshes += [(f"tetrahedra, {of['size_mm']:g} mm", of) for of in found]
-    for name, of in meshes:
-        parts = (f"{100 * (of['volumes_mm3'][t] / formulas[t] - 1):+.3f} %" for t in TISSUES)
-        rows.append(f"| {name} | " + " | ".join(parts) + " |")
-    skin, interface = (np.array(truth["atlas"][name]["positions_mm"]) for name in ("skin", "interface"))
-    bounds = finger.bounds(finger.named(skin))
-    away = [1e6 * np.linalg.norm(a - b, axis=1) for a, b in ((skin, bounds[0]), (interface, bounds[1]))]
-    rows += ["", "| distance of `fe-datagen`'s vertices | nine in ten lie within, nm | farthest, nm |"]
-    rows.append("|---|---|---|")
-    for name, of in zip(("skin", "interface"), away, strict=True):
-        rows.append(f"| {name} | {np.percentile(of, 90):.1f} | {of.max():.1f} |")
-    print("\n".join(rows))
+    tets = [on_tetrahedra(out, finger, size, options) for size in options.size]
+    tables = [table_of_presses(hexes, tets, truth), table_of_volumes(hexes, tets, finger)]
+    tables.append(table_of_vertices(truth, finger))
+    print("\n\n".join("\n".join(rows) for rows in tables))
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ def solved(scene: Path, text: str) -> dict:
     folder = scene.with_suffix("")
     took, deck = folder / "processor_s.json", folder / f"{scene.stem}.inp"
     if not (took.is_file() and scene.is_file() and scene.read_text() == text):
+        took.unlink(missing_ok=True)
         scene.write_text(text)
         seconds = fe_datagen("solve", scene, "--out", folder)
         fe_datagen("export", scene, "--format", "inp", "--out", folder)
