@@ -67,8 +67,8 @@ pub use error_estimate::{ERROR_ESTIMATE_LEN, ErrorEstimate, LikelyError};
 pub use frame::{FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, flags};
 pub use input_statistics::{InputStatistics, Look};
 pub use map::{
-    MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
-    keep_inside, peak,
+    DOUBTED_BELOW_PA, MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange,
+    check_pressure, keep_inside, peak,
 };
 pub use message::{
     ClientMessage, FingerTerms, Hello, MessageError, Ready, Reconnect, ReconnectReason, Resumption,

@@ -1,6 +1,6 @@
 //! The map: 224 x 224 samples, row by row, with row 0 at the tip of the finger.
 
-use crate::{ErrorCode, Problem, effects::OutOfRange};
+use crate::{ErrorCode, Problem, SampleType, effects::OutOfRange};
 
 pub use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
 
@@ -82,6 +82,10 @@ pub const FLAGGED_HEADROOM: f32 = 10.0;
 /// finger, and sums over a map stay finite.
 pub const CLAMPED_HEADROOM: f32 = 1e4;
 
+/// Greatest pressure of a map, Pa, below which its unit is in doubt: a map in kPa or MPa that is sent as
+/// one in Pa stays below, and of the contacts that people feel hardly any does.
+pub const DOUBTED_BELOW_PA: f32 = 150.0;
+
 /// What [`PressureRange::check`] learns on its way through the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapSummary {
@@ -103,6 +107,19 @@ impl MapSummary {
     #[must_use]
     pub fn is_zero(&self) -> bool {
         self.peak_pa <= 0.0
+    }
+
+    /// Whether the greatest pressure is so small that its [unit is in doubt](DOUBTED_BELOW_PA).
+    #[must_use]
+    pub fn is_doubtful(&self) -> bool {
+        !self.is_zero() && self.peak_pa < DOUBTED_BELOW_PA
+    }
+
+    /// Whether the greatest pressure is the greatest number of 16 bits (f16), to rounding. Encoders of
+    /// clients write it in the place of any greater one, so the true pressure may be higher.
+    #[must_use]
+    pub fn is_full_scale(&self) -> bool {
+        (self.peak_pa / SampleType::F16.value_max(1.0) - 1.0).abs() < 1e-6
     }
 }
 

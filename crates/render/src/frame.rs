@@ -168,7 +168,9 @@ impl<'a> Rendering<'a> {
         };
         let sed = onnx_sha256.zip(way).and_then(|(network, way)| laws.sed(network, way));
         let unlike = flags::UNFAMILIAR | flags::CUT_OFF | flags::UNSETTLED;
-        let is_like = self.flags & unlike == 0 && !self.read.range.is_left_by(self.read.summary);
+        let is_within =
+            !self.read.range.is_left_by(self.read.summary) && !self.maps.is_full_scale();
+        let is_like = self.flags & unlike == 0 && is_within;
         let sed = sed.filter(|_| is_like && self.sed.is_some()).map(|law| law.at(&self.facts()));
         let force = match (self.read.source, way.and_then(|way| laws.force(way))) {
             (Source::Contact(felt), Some(law)) if self.flags & flags::CUT_OFF == 0 => {

@@ -78,6 +78,8 @@ pub struct Maps {
     seen_peak_pa: f32,
     /// The statistics of that pressure, if the training is known.
     look: Look,
+    /// Greatest pressure as the client sent it, Pa; none if the service found the pressure itself.
+    sent: Option<MapSummary>,
 }
 
 /// What [`Maps::judge`] found.
@@ -92,8 +94,8 @@ pub(crate) struct Judged {
 impl Default for Maps {
     fn default() -> Self {
         let [pressure_pa, sed_j_per_m3, clamped_pa] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
-        let (seen_peak_pa, look) = (0.0, Look::default());
-        Self { pressure_pa, sed_j_per_m3, clamped_pa, is_clamped: false, seen_peak_pa, look }
+        let (seen_peak_pa, look, sent) = (0.0, Look::default(), None);
+        Self { pressure_pa, sed_j_per_m3, clamped_pa, is_clamped: false, seen_peak_pa, look, sent }
     }
 }
 
@@ -108,7 +110,9 @@ impl Maps {
         skin: &SkinPixels,
     ) -> Result<MapSummary, Problem> {
         range.check(&self.pressure_pa)?;
-        Ok(keep_inside(&mut self.pressure_pa, &skin.mask))
+        let summary = keep_inside(&mut self.pressure_pa, &skin.mask);
+        self.sent = Some(summary);
+        Ok(summary)
     }
 
     /// The same for a finger whose pressure was sent as a map; the map is scaled to the reference
@@ -140,8 +144,10 @@ impl Maps {
     ) -> Result<Taken, Problem> {
         let map_pa = shows_sed.then_some(&mut self.pressure_pa[..]);
         let mut taken = finger.take(frame, map_pa)?;
+        self.sent = None;
         if finger.takes_pressure() {
             finger.require_within(range)?;
+            self.sent = Some(MapSummary { peak_pa: taken.peak_pa * finger.stiffness() });
         }
         if range.is_left_by(MapSummary { peak_pa: finger.traction_peak_pa() }) {
             taken.flags |= flags::OUT_OF_RANGE;
@@ -167,10 +173,13 @@ impl Maps {
             self.look.statistics.is_out_of_distribution(trained)
         };
         let is_unfamiliar = !is_zero && trained_max.is_some_and(is_outside);
+        let sent = self.sent.filter(|_| !is_zero);
+        let is_doubtful = trained_max.is_some() && sent.is_some_and(|sent| sent.is_doubtful());
+        let is_full_scale = self.is_full_scale();
         let flags = [
-            (range.is_left_by(summary), flags::OUT_OF_RANGE),
+            (range.is_left_by(summary) || is_full_scale, flags::OUT_OF_RANGE),
             (is_cut_off, flags::CUT_OFF),
-            (is_unfamiliar, flags::UNFAMILIAR),
+            (is_unfamiliar || is_doubtful, flags::UNFAMILIAR),
             (is_zero, flags::NO_CONTACT),
         ];
         let flags = flags.into_iter().map(|(on, flag)| if on { flag } else { 0 }).sum();
@@ -178,6 +187,11 @@ impl Maps {
             self.sed_j_per_m3.fill(0.0);
         }
         Judged { flags, is_zero }
+    }
+
+    /// Whether the client may have sent less pressure than there is, since its numbers end there.
+    pub(crate) fn is_full_scale(&self) -> bool {
+        self.sent.is_some_and(|sent| sent.is_full_scale())
     }
 
     /// Runs the network on the pressure as [`judge`](Self::judge) left it.
@@ -229,6 +243,48 @@ impl Maps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use papilla_proto::{
+        atlas::{Atlas, Patch, Raster},
+        effects::OutOfRange,
+    };
+
+    /// A press of 8 kPa sent in kPa, as it is, and beyond what 16 bits hold.
+    #[test]
+    fn a_unit_in_doubt_and_a_number_at_its_end_are_told() -> Result<(), Box<dyn std::error::Error>>
+    {
+        std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
+        let atlas = Atlas::from_json(&std::fs::read_to_string("models/atlas.json")?)?;
+        let skin = SkinPixels::from(&Raster::new(&atlas, Patch::Skin));
+        let range = PressureRange { trained_max_pa: 9e4, beyond: OutOfRange::Clamp };
+        let all = boundless();
+        let mut maps = Maps::default();
+        for (peak_pa, knows, due) in [
+            (8.0, true, flags::UNFAMILIAR),
+            (8.0, false, 0),
+            (8e3, true, 0),
+            (65_504.0, true, flags::OUT_OF_RANGE),
+            (0.0, true, flags::NO_CONTACT),
+        ] {
+            (95..115).for_each(|row| maps.pressure_pa[row * 224 + 105..][..25].fill(peak_pa));
+            let summary = maps.check(range, &skin)?;
+            let found = maps.judge(summary, range, &skin, knows.then_some(all)).flags;
+            assert_eq!(found, due, "{peak_pa} Pa");
+        }
+        Ok(())
+    }
+
+    /// Of a training that knows every place, and any roughness, load and area.
+    fn boundless() -> InputStatistics {
+        let of = InputStatistics::of(&vec![1e3; MAP_LEN]);
+        InputStatistics {
+            roughness: f32::MAX,
+            load_mpa_px: f32::MAX,
+            rough_load_mpa_px: f32::MAX,
+            area_px: f32::MAX,
+            contrast_px: f32::MAX,
+            ..of
+        }
+    }
 
     /// 20 kPa has made at most 6 /MPa of it, as SED: 2400 J/m3.
     #[test]
