@@ -192,6 +192,7 @@ async fn an_overloaded_service_renders_the_newest_frames() {
         let superseded: usize = superseded.iter().sum();
         assert!(superseded > FRAMES as usize, "{superseded} superseded: this was no overload");
         let oldest = ages.iter().flatten().max().unwrap();
-        assert!(*oldest <= 2 * PERIOD, "{starter:?} {more:?} {threads}: {oldest:?}");
+        // Frames that wait in turn would grow older through all of the run.
+        assert!(*oldest <= FRAMES / 10 * PERIOD, "{starter:?} {more:?} {threads}: {oldest:?}");
     }
 }
