@@ -1,6 +1,7 @@
 //! A mesh from a file.
 
 use super::Mesh;
+use super::mesh::{MeshError, TRIANGLES_MAX};
 use super::rules::{BadValue, ShapeError, require};
 use crate::MeshDistance;
 use serde::{Deserialize, Serialize};
@@ -8,11 +9,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Unit of lengths in a file of a mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum LengthUnit {
     /// Millimetre.
-    #[default]
     #[serde(rename = "mm")]
     Millimetre,
     /// Centimetre.
@@ -28,6 +28,9 @@ pub enum LengthUnit {
 
 #[cfg(feature = "files")]
 impl LengthUnit {
+    /// All of them, the likeliest first.
+    const ALL: [Self; 4] = [Self::Millimetre, Self::Metre, Self::Centimetre, Self::Inch];
+
     const fn mm(self) -> f64 {
         match self {
             Self::Millimetre => 1.0,
@@ -36,7 +39,29 @@ impl LengthUnit {
             Self::Inch => 25.4,
         }
     }
+
+    /// As a scene writes it.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Millimetre => "mm",
+            Self::Centimetre => "cm",
+            Self::Metre => "m",
+            Self::Inch => "in",
+        }
+    }
+
+    /// What a file is in that says nothing of it: GLB is in metres by its standard, others are taken
+    /// to be in mm.
+    fn of(file: &Path) -> Self {
+        let is_glb = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
+        if is_glb { Self::Metre } else { Self::Millimetre }
+    }
 }
+
+/// Greatest side of what is believed to press a finger if no unit is given, mm; the loader of the
+/// Python client believes the same.
+#[cfg(feature = "files")]
+const SIZE_MM: [f64; 2] = [0.5, 500.0];
 
 /// A body whose surface is in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,9 +70,10 @@ impl LengthUnit {
 pub struct MeshFile {
     /// STL, OBJ, PLY or GLB, relative to the scene's folder.
     pub file: PathBuf,
-    /// Unit of its lengths.
-    #[serde(default)]
-    pub unit: LengthUnit,
+    /// Unit of its lengths; GLB is in m and others are in mm if not given, and a size that looks wrong
+    /// is asked about.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<LengthUnit>,
     /// What the file holds, once it was read.
     #[serde(skip)]
     pub mesh: Option<Arc<Mesh>>,
@@ -59,10 +85,13 @@ impl MeshFile {
         require(named, "file", &self.file, "has to name an STL, OBJ, PLY or GLB file")
     }
 
-    /// Reads the file, which `folder` is the place of, if it was not read.
+    /// Reads the file, which `folder` is the place of, if it was not read, and names the unit that it
+    /// was taken in.
     pub(super) fn load(&mut self, folder: &Path) -> Result<(), ShapeError> {
         if self.mesh.is_none() {
             self.mesh = Some(Arc::new(self.read(folder)?));
+            #[cfg(feature = "files")]
+            self.unit.get_or_insert(LengthUnit::of(&self.file));
         }
         Ok(())
     }
@@ -77,8 +106,17 @@ impl MeshFile {
     #[cfg(feature = "files")]
     fn read(&self, folder: &Path) -> Result<Mesh, ShapeError> {
         let path = folder.join(&self.file);
-        let read = crate::files::surface(&path, self.unit.mm());
-        read.map_err(|error| ShapeError::MeshFile { path, message: error.to_string() })
+        let unit = self.unit.unwrap_or_else(|| LengthUnit::of(&self.file));
+        let mesh = match crate::files::surface(&path, unit.mm()) {
+            Ok(mesh) => mesh,
+            Err(error) => return Err(ShapeError::MeshFile { path, message: error.to_string() }),
+        };
+        match self.unit {
+            None => believed(&mesh, unit)
+                .map(|()| mesh)
+                .map_err(|message| ShapeError::MeshFile { path, message }),
+            Some(_) => Ok(mesh),
+        }
     }
 
     /// How far it goes along a unit vector, mm; infinite before the file was read.
@@ -95,11 +133,47 @@ impl MeshFile {
             Some(mesh) => Arc::clone(mesh),
             None => Arc::new(self.read(folder)?),
         };
-        read.build().map_err(|error| ShapeError::MeshFile {
-            path: folder.join(&self.file),
-            message: error.to_string(),
+        read.build().map_err(|error| {
+            let path = folder.join(&self.file);
+            let how = match error {
+                MeshError::Count { found } if found > TRIANGLES_MAX => format!(
+                    ". A mesh program does that (MeshLab: Quadric Edge Collapse Decimation; Blender: \
+                     the modifier Decimate), or Python: trimesh.load({:?}, force=\"mesh\")\
+                     .simplify_quadric_decimation(face_count={TRIANGLES_MAX}).export(\"fewer.stl\"), \
+                     with the packages of papilla[meshes]",
+                    path.display().to_string()
+                ),
+                _ => String::new(),
+            };
+            ShapeError::MeshFile { message: format!("{error}{how}"), path }
         })
     }
+}
+
+/// Refuses a size that is not plausible for what presses a finger, and says in which unit it would be.
+#[cfg(feature = "files")]
+fn believed(mesh: &Mesh, unit: LengthUnit) -> Result<(), String> {
+    let side = |i: usize| {
+        let along = || mesh.vertices_mm.iter().map(|p| p[i]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    let size_mm = (0..3).map(side).fold(0.0, f64::max);
+    let [least, most] = SIZE_MM;
+    if (least..=most).contains(&size_mm) {
+        return Ok(());
+    }
+    let fits = LengthUnit::ALL.into_iter().filter_map(|other| {
+        let meant_mm = size_mm / unit.mm() * other.mm();
+        let fits = (least..=most).contains(&meant_mm);
+        fits.then(|| format!("unit = \"{}\" ({meant_mm:.4} mm)", other.name()))
+    });
+    let meant = fits.collect::<Vec<_>>().join(" or ");
+    let meant = if meant.is_empty() { "another size".into() } else { meant };
+    Err(format!(
+        "it would measure {size_mm:.4e} mm if its lengths are in {unit}: give {meant} if that is meant, \
+         or unit = \"{unit}\" if it is so",
+        unit = unit.name()
+    ))
 }
 
 #[cfg(test)]
@@ -145,6 +219,71 @@ mod tests {
                 "the corners stay in the file"
             );
         }
+    }
+
+    /// A triangle pyramid with these edges as a GLB: one buffer of places, no indices.
+    fn glb(edge: f32) -> Vec<u8> {
+        let corners = [[0.0, 0.0, 0.0], [edge, 0.0, 0.0], [0.0, edge, 0.0], [0.0, 0.0, edge]];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let places = faces.iter().flatten().flat_map(|&c: &usize| corners[c]);
+        let binary: Vec<u8> = places.flat_map(f32::to_le_bytes).collect();
+        let length = binary.len();
+        let mut json = format!(
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"meshes\":[{{\"primitives\":[{{\"attributes\":\
+             {{\"POSITION\":0}}}}]}}],\"accessors\":[{{\"bufferView\":0,\"componentType\":5126,\
+             \"count\":12,\"type\":\"VEC3\"}}],\"bufferViews\":[{{\"byteLength\":{length}}}]}}"
+        );
+        json += &" ".repeat(3 - (json.len() + 3) % 4);
+        let mut bytes = b"glTF".to_vec();
+        let whole = 12 + 8 + json.len() + 8 + length;
+        bytes.extend([2, whole as u32].into_iter().flat_map(u32::to_le_bytes));
+        for (kind, chunk) in [(0x4E4F_534A_u32, json.as_bytes()), (0x004E_4942, &binary)] {
+            bytes.extend([chunk.len() as u32, kind].into_iter().flat_map(u32::to_le_bytes));
+            bytes.extend(chunk);
+        }
+        bytes
+    }
+
+    #[test]
+    fn a_glb_is_in_metres_and_a_size_that_looks_wrong_is_asked_about() {
+        let folder = tempfile::tempdir().unwrap();
+        let taken = |file: &str, bytes: &[u8], unit: &str| {
+            std::fs::write(folder.path().join(file), bytes).unwrap();
+            let text = format!("shape = \"mesh\"\nfile = \"{file}\"\n{unit}");
+            let mut spec: IndenterSpec = toml::from_str(&text).unwrap();
+            spec.load(folder.path()).map_err(|e| e.to_string())?;
+            Ok::<_, String>((spec.top_mm(), toml::to_string(&spec).unwrap()))
+        };
+        let (top_mm, text) = taken("a.glb", &glb(0.012), "").unwrap();
+        assert!((top_mm - 12.0).abs() < 1e-5 && text.contains("unit = \"m\""), "{top_mm} {text}");
+        let (top_mm, _) = taken("a.glb", &glb(12.0), "unit = \"mm\"").unwrap();
+        assert!((top_mm - 12.0).abs() < 1e-5, "{top_mm}");
+        let said = taken("a.glb", &glb(12.0), "").unwrap_err();
+        assert!(
+            said.contains("1.2000e4 mm") && said.contains("unit = \"mm\" (12.0000 mm)"),
+            "{said}"
+        );
+        let said = taken("b.obj", obj(1e3).as_bytes(), "").unwrap_err();
+        assert!(said.contains("unit = \"m\" (6.0000 mm)"), "{said}");
+        // Said, it is not asked about.
+        let (top_mm, _) = taken("b.obj", obj(1e3).as_bytes(), "unit = \"mm\"").unwrap();
+        assert!((top_mm - 1e-3).abs() < 1e-9, "{top_mm}");
+        let (top_mm, text) = taken("b.obj", obj(1.0).as_bytes(), "").unwrap();
+        assert!((top_mm - 1.0).abs() < 1e-9 && text.contains("unit = \"mm\""), "{text}");
+    }
+
+    #[test]
+    fn too_many_triangles_are_refused_with_the_way_to_fewer() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut text = obj(1.0);
+        text += &"f 1 2 3\n".repeat(crate::TRIANGLES_MAX);
+        std::fs::write(folder.path().join("many.obj"), text).unwrap();
+        let spec: IndenterSpec = toml::from_str("shape = \"mesh\"\nfile = \"many.obj\"").unwrap();
+        let said = spec.build(folder.path()).err().unwrap().to_string();
+        assert!(
+            said.contains("simplify it. A mesh program") && said.contains("face_count"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -261,6 +261,16 @@ impl SignedDistance for MeshDistance {
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {
         self.corners_mm.iter().map(|p| dot(*p, direction)).fold(f64::NEG_INFINITY, f64::max)
     }
+
+    /// Of the whole body across the direction in which it presses: parts of it may be narrower.
+    fn narrowest_mm(&self) -> f64 {
+        let wide = |i: usize| {
+            let along =
+                |sign| self.reach_mm(std::array::from_fn(|k| if k == i { sign } else { 0.0 }));
+            along(1.0) + along(-1.0)
+        };
+        wide(0).min(wide(1))
+    }
 }
 
 fn square(a: [f64; 3]) -> f64 {
