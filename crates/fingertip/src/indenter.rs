@@ -31,6 +31,29 @@ pub enum IndenterError {
          the angles, or take a larger one"
     )]
     NeverTouches,
+    /// It fits between the points that contact is found at.
+    #[error(
+        "the indenter meets no point at which contact is found: it is {width_mm:.3} mm wide, and the \
+         nodes of the skin are about {spacing_mm:.3} mm apart. Take geometry.order = \"graded\" or a \
+         finer mesh, or an indenter as wide as a few distances of nodes"
+    )]
+    BetweenNodes {
+        /// Width of its narrowest part, mm.
+        width_mm: f64,
+        /// Distance of nodes, mm.
+        spacing_mm: f64,
+    },
+    /// It would have to go into bone.
+    #[error(
+        "motion.depth_mm = {depth_mm}: the indenter would reach the bone, which does not give way, at \
+         {room_mm:.2} mm. Press less deep"
+    )]
+    BeyondBone {
+        /// Depth that was asked for, mm.
+        depth_mm: f64,
+        /// Depth at which the bone of the undeformed body begins, mm.
+        room_mm: f64,
+    },
     /// A part of it fits between the nodes that contact is found at.
     #[error(
         "the indenter is finer than the mesh: {by_mm:.3} mm of it goes in between the nodes of a face \

@@ -186,8 +186,15 @@ def test_a_map_that_cannot_press_is_said(tmp_path):
         (-press, "never pulled"),
         (1e9 * press, "were Pa meant"),
     ]:
-        with pytest.raises(papilla.BadScene, match=words):
-            fe.Scene(head, pressure=values).explain()
+        with pytest.raises(papilla.BadScene, match=words) as bad:
+            fe.Scene(head, pressure=values)
+        assert bad.value.field == "pressure"
+    corner = np.zeros((224, 224))
+    corner[:5, :5] = 8e3
+    with pytest.raises(papilla.BadScene, match="none of its pressure is on the skin"):
+        fe.Scene(head, pressure=corner).explain()
+    small = fe.Scene(head, pressure=1e-3 * press)
+    assert "indenter" not in small.as_dict() and "kPa" in small.explain()["doubts"][0]
     np.save(tmp_path / "small.npy", press[:8])
     with pytest.raises(papilla.BadScene, match=r"shape \[8, 224\]"):
         fe.Scene(head + f'file = "{tmp_path}/small.npy"\n').explain()

@@ -5,8 +5,8 @@
 //! the number of equilibria follows from the stored states.
 
 use crate::scene::effects::Law;
-use crate::simulation::Simulation;
 use crate::simulation::drive::{Drive, DrivePoint};
+use crate::simulation::{Simulation, equilibria as way_equilibria};
 use serde::Serialize;
 
 /// Iterations of a whole indentation.
@@ -46,8 +46,6 @@ const FORCES_PER_STATE: f64 = 2.0;
 const TRIES_PER_FORCE: f64 = 7.7;
 /// Equilibria on the way to the whole of a given pressure.
 const SHARES: f64 = 8.0;
-/// Equilibria between first touch and the first two stored depths.
-const EXTRA_DEPTHS: [usize; 2] = [5, 1];
 
 impl Work {
     pub(super) fn new(setup: &Simulation) -> Self {
@@ -83,7 +81,8 @@ fn equilibria(setup: &Simulation) -> f64 {
     let points = match &setup.drive {
         Drive::Forces(forces) => return TRIES_PER_FORCE * forces.len() as f64,
         Drive::Depths(depths) => {
-            return (depths.len() + EXTRA_DEPTHS.iter().take(depths.len()).sum::<usize>()) as f64;
+            return way_equilibria(depths, setup.body.has_guide() && setup.approach.friction == 0.0)
+                as f64;
         }
         Drive::Shares(shares) => return SHARES.max(shares.len() as f64),
         Drive::Path(points) => points,

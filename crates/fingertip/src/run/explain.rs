@@ -1,5 +1,6 @@
 //! What a scene is going to simulate and cost, before it runs.
 
+use super::doubts;
 use crate::forecast::{Forecast, SedError, better};
 use crate::scene::effects::{EFFECTS, Effect};
 use crate::scene::{Geometry, Output, Plan, Pressure, Scene};
@@ -43,6 +44,9 @@ pub struct Explanation {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     mended: Vec<String>,
     motion: String,
+    /// What may be a mistake.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    doubts: Vec<String>,
     /// Written by `solve` beside `summary.json`.
     outputs: Vec<Output>,
     plan: Plan,
@@ -90,6 +94,7 @@ impl Explanation {
         let clock = Instant::now();
         let setup = Simulation::new(scene)?;
         let setup_s = clock.elapsed().as_secs_f64();
+        let doubts = doubts(scene, &setup)?;
         let forecast = Forecast::new(scene, &setup);
         let state = |e: &Effect| (e.state)(&forecast.census);
         let (on, off): (Vec<_>, Vec<_>) = EFFECTS.into_iter().partition(|e| scene.has(e.name));
@@ -114,6 +119,7 @@ impl Explanation {
             },
             mended: setup.approach.shape.mended(),
             motion: motion(scene, &setup.drive),
+            doubts,
             outputs: Output::ALL.into_iter().filter(|&o| scene.writes(o)).collect(),
             simulated: simulated.collect(),
             left_out: left_out.collect(),
@@ -181,6 +187,9 @@ impl Explanation {
             let words = better.sed_error.map_or_else(String::new, |(error, _)| error.words());
             text +=
                 &format!("\n               {BETTER}: {words}, in about {:.1} s", better.seconds);
+        }
+        for doubt in &e.doubts {
+            text += &format!("\ndoubt          {doubt}");
         }
         text
     }

@@ -26,11 +26,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod doubts;
 mod explain;
 mod press;
 mod summary;
 mod vtu;
 
+pub use doubts::doubts;
 pub use explain::{BETTER, Explanation};
 pub use press::{Pressed, press};
 pub use summary::Increment;

@@ -3,9 +3,12 @@
 use crate::simulation::Simulation;
 use crate::simulation::balanced::Balanced;
 use crate::simulation::body::SimulationError;
+use crate::simulation::drive::Drive;
 use crate::simulation::record::IncrementRecord;
 use papilla_dataset::BALANCE_RELATIVE_MAX;
+use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Solver, StepReport};
+use papilla_solid::tensor::norm;
 
 /// A stored equilibrium.
 #[derive(Clone, Debug)]
@@ -16,6 +19,34 @@ pub struct Pressed {
     pub report: StepReport,
     /// Greatest pressure on the contact surface, MPa.
     pub pressure_mpa_max: f64,
+    /// Why the contact is none to rely on; `None` if it is.
+    pub doubt: Option<String>,
+}
+
+/// Most nodes in contact whose force is that of so many nodes rather than of the indenter: on the
+/// coarse even mesh a ball of 2 mm radius, .4 mm deep, has 59 % of the force that it has on the medium
+/// graded mesh where it stands on one node, and 142 % where it stands between four.
+const FEW: usize = 4;
+
+/// Why a state's contact is none to rely on.
+fn doubt(setup: &Simulation, solver: &Solver<'_>, record: &IncrementRecord) -> Option<String> {
+    let depth_mm = record.depth_mm;
+    if matches!(setup.drive, Drive::Depths(_)) && norm(record.force_n) == 0.0 {
+        return Some(format!(
+            "there is no force at a depth of {depth_mm} mm: the indenter slipped between the nodes of \
+             the mesh. Take geometry.order = \"graded\" or a finer mesh, or a larger indenter (is its \
+             unit the one that was meant?)"
+        ));
+    }
+    let is_nodal = record.contact == ContactRule::Nodal && !matches!(setup.drive, Drive::Shares(_));
+    let touching = solver.traction_mpa().iter().filter(|t| **t > 0.0).count();
+    (is_nodal && !setup.body.plane && (1..=FEW).contains(&touching)).then(|| {
+        format!(
+            "the contact rests on {touching} node{} of the skin: its force and pressure are those of the \
+             mesh. Take geometry.order = \"graded\" or a finer mesh, or press deeper",
+            if touching == 1 { "" } else { "s" }
+        )
+    })
 }
 
 /// Presses; `visit` is told of each stored equilibrium as it is found, with its number from 0. Where
@@ -33,7 +64,9 @@ pub fn press(
     let keep =
         &mut |state: usize, s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
             let pressure_mpa_max = body.pressure_mpa(s).into_iter().fold(0.0, f64::max);
-            let pressed = Pressed { record: record.clone(), report: *report, pressure_mpa_max };
+            let doubt = doubt(setup, s, record);
+            let record = record.clone();
+            let pressed = Pressed { record, report: *report, pressure_mpa_max, doubt };
             visit(state, s, &pressed);
             if state == 0 {
                 way_before = std::mem::take(&mut way);

@@ -41,7 +41,8 @@ pub struct Increment {
     pub effort: Effort,
     /// Wall time.
     pub seconds: f64,
-    /// Why this state would not enter a dataset; absent if it would.
+    /// Why this state is none to rely on: it would not enter a dataset, or its contact rests on too few
+    /// nodes; absent if it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fault: Option<String>,
 }
@@ -50,7 +51,7 @@ impl Increment {
     /// Of a state; `maps` are those of its finger.
     #[must_use]
     pub fn of(pressed: &Pressed, maps: Option<&FingerMaps>) -> Self {
-        let Pressed { record, report, pressure_mpa_max } = pressed;
+        let Pressed { record, report, pressure_mpa_max, doubt } = pressed;
         let own = || sample::fault(record, record.pressure_mpa.len());
         let max = |v: &[f64]| {
             let largest = PA_PER_MPA * v.iter().copied().fold(0.0, f64::max);
@@ -70,7 +71,7 @@ impl Increment {
             condition_at_least: Some(report.condition_at_least).filter(|c| c.is_finite()),
             effort: report.effort,
             seconds: record.seconds,
-            fault: maps.map_or_else(own, |maps| maps.fault(record)),
+            fault: maps.map_or_else(own, |maps| maps.fault(record)).or_else(|| doubt.clone()),
         }
     }
 }

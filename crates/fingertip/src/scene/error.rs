@@ -139,9 +139,10 @@ pub(crate) fn indenter_field(error: &IndenterError) -> String {
         IndenterError::NeverTouches | IndenterError::StartsInside { .. } => {
             "motion.offset_mm".into()
         }
-        IndenterError::FinerThanMesh { .. } | IndenterError::FinerThanCells { .. } => {
-            "indenter".into()
-        }
+        IndenterError::FinerThanMesh { .. }
+        | IndenterError::FinerThanCells { .. }
+        | IndenterError::BetweenNodes { .. } => "indenter".into(),
+        IndenterError::BeyondBone { .. } => "motion.depth_mm".into(),
     }
 }
 

@@ -17,6 +17,7 @@ mod outputs;
 mod pressure;
 #[cfg(test)]
 mod tests;
+mod told;
 
 pub use biphasic::{Biphasic, SkinFlow};
 pub use census::Census;
@@ -42,7 +43,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A scene file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// What is pressed.

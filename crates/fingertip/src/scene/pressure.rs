@@ -52,10 +52,12 @@ fn one() -> usize {
 const INCREMENTS_MAX: usize = 1000;
 /// Beyond it a pressure in Pa must have been meant in another unit.
 const PRESSURE_MAX_PA: f32 = 1e7;
+/// Below it kPa or MPa may have been given for Pa; the Python client asks about the same.
+const PRESSURE_ASKED_PA: f32 = 150.0;
 /// Largest file that is read.
 const FILE_BYTES_MAX: u64 = 1 << 30;
 
-/// A map that cannot be read or cannot press.
+/// A file that cannot be read.
 fn refused(message: String) -> SceneError {
     SceneError::Pressure { field: "pressure.file", message }
 }
@@ -87,6 +89,9 @@ impl Scene {
                 "give one map: in a file, or by the program that runs the scene",
             );
         }
+        if let Some(map) = &pressure.map_pa {
+            pressure.checked(map)?;
+        }
         require(
             (1..=INCREMENTS_MAX).contains(&pressure.increments),
             "pressure.increments",
@@ -114,8 +119,44 @@ impl Pressure {
             (None, Some(file)) => Arc::new(self.read(&folder.join(file))?),
             (None, None) => return Err(refused("no map is given".into())),
         };
-        checked(&map)?;
+        self.checked(&map)?;
         Ok(map)
+    }
+
+    /// The map cannot press: `message` says why.
+    pub(crate) fn cannot(&self, message: String) -> SceneError {
+        let field = if self.file.is_some() { "pressure.file" } else { "pressure" };
+        SceneError::Pressure { field, message }
+    }
+
+    /// Whether a map is one that can press.
+    fn checked(&self, map: &[f32]) -> Result<(), SceneError> {
+        if map.len() != MAP_LEN {
+            let values = map.len();
+            let message = format!("{values} values; {MAP_LEN} of 224 x 224 pixels are due");
+            return Err(self.cannot(message));
+        }
+        let at = |i: usize| format!("row {}, column {}", i / MAP_SIDE_PX, i % MAP_SIDE_PX);
+        if let Some(i) = map.iter().position(|p| !(p.is_finite() && *p >= 0.0)) {
+            let message = format!("{} Pa at {}; skin is pressed, never pulled", map[i], at(i));
+            return Err(self.cannot(message));
+        }
+        let most = map.iter().copied().fold(0.0, f32::max);
+        if most <= 0.0 {
+            return Err(self.cannot("no pressure anywhere".into()));
+        }
+        if most > PRESSURE_MAX_PA {
+            let message = format!("{most:e} Pa; were Pa meant? {PRESSURE_MAX_PA:e} at most");
+            return Err(self.cannot(message));
+        }
+        Ok(())
+    }
+
+    /// The greatest pressure of a map, if it is so small that it was probably given in kPa or MPa.
+    #[must_use]
+    pub(crate) fn tiny_pa(map: &[f32]) -> Option<f32> {
+        let most = map.iter().copied().fold(0.0, f32::max);
+        (most < PRESSURE_ASKED_PA).then_some(most)
     }
 
     fn read(&self, path: &Path) -> Result<Vec<f32>, SceneError> {
@@ -172,27 +213,4 @@ impl Pressure {
             ))),
         }
     }
-}
-
-/// Whether a map is one that can press.
-fn checked(map: &[f32]) -> Result<(), SceneError> {
-    if map.len() != MAP_LEN {
-        return Err(refused(format!(
-            "{} values; {MAP_LEN} of 224 x 224 pixels are due",
-            map.len()
-        )));
-    }
-    let at = |i: usize| format!("row {}, column {}", i / MAP_SIDE_PX, i % MAP_SIDE_PX);
-    if let Some(i) = map.iter().position(|p| !(p.is_finite() && *p >= 0.0)) {
-        let message = format!("{} Pa at {}; skin is pressed, never pulled", map[i], at(i));
-        return Err(refused(message));
-    }
-    let most = map.iter().copied().fold(0.0, f32::max);
-    if most <= 0.0 {
-        return Err(refused("no pressure anywhere".into()));
-    }
-    if most > PRESSURE_MAX_PA {
-        return Err(refused(format!("{most:e} Pa; were Pa meant? {PRESSURE_MAX_PA:e} at most")));
-    }
-    Ok(())
 }

@@ -182,6 +182,8 @@ pub struct Under {
     pub pressure: Arc<SurfacePressure>,
     /// The whole of it at each node of the mesh, MPa.
     pub nodal_mpa: Vec<f64>,
+    /// Whether any of it is on the skin.
+    pub presses: bool,
 }
 
 /// A body ready to be pressed, shared by every indentation of a campaign.

@@ -34,6 +34,7 @@ mod fluid;
 mod guide;
 pub mod laws;
 pub mod maps;
+mod missed;
 pub mod pressed;
 pub mod record;
 pub mod sample;
@@ -44,6 +45,7 @@ mod touch;
 mod way;
 
 pub use setup::Simulation;
+pub(crate) use way::equilibria;
 
 #[cfg(test)]
 mod tests;

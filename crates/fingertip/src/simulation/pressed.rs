@@ -174,13 +174,19 @@ impl Body {
         let body = Self::with_patch(mesh, materials, fixed, patch, false)?;
         let mesh = &body.problem.mesh;
         let at_mpa = |x: [f64; 3]| on_skin.at_pa(x) / PA_PER_MPA;
-        let pressure = SurfacePressure::new(mesh, &body.contact, &mut |x| at_mpa(x))
+        let mut presses = false;
+        let mut seen_mpa = |x| {
+            let mpa = at_mpa(x);
+            presses |= mpa > 0.0;
+            mpa
+        };
+        let pressure = SurfacePressure::new(mesh, &body.contact, &mut seen_mpa)
             .map_err(SimulationError::Pressure)?;
         let mut nodal_mpa = vec![0.0; mesh.nodes.len()];
         for n in mesh.surfaces[&body.contact].nodes() {
             nodal_mpa[n as usize] = at_mpa(mesh.nodes[n as usize]);
         }
-        let under = Some(Under { pressure: Arc::new(pressure), nodal_mpa });
+        let under = Some(Under { pressure: Arc::new(pressure), nodal_mpa, presses });
         Ok(Self { graded: order == Order::Graded, under, ..body })
     }
 

@@ -60,7 +60,13 @@ impl Simulation {
         let drive = drive(&scene.motion);
         let body = body(scene, &plan, &approach, &drive)?.filled(&scene.materials, &plan)?;
         // An indenter that never touches is found now, not after files are written.
-        body.indenter(&approach, &drive)?;
+        let indenter = body.indenter(&approach, &drive)?;
+        if let (Drive::Depths(depths_mm), Some(room_mm)) = (&drive, body.room_mm(&indenter))
+            && let Some(&depth_mm) = depths_mm.last()
+            && depth_mm >= room_mm
+        {
+            return Err(IndenterError::BeyondBone { depth_mm, room_mm }.into());
+        }
         Ok(Self { plan, body, approach, drive })
     }
 }
@@ -76,6 +82,12 @@ impl Simulation {
         let materials = solids(&scene.materials, &plan)?;
         let mesh = (*density, *order, plan.parts);
         let body = Body::fingertip_under(shape, materials, mesh, &map_pa)?;
+        if !body.under.as_ref().is_some_and(|under| under.presses) {
+            let message = "none of its pressure is on the skin: the pixels that have some lie off the \
+                           atlas' finger, or between the points of the mesh (docs/reference/atlas.md \
+                           shows which pixels are skin)";
+            return Err(pressure.cannot(message.into()).into());
+        }
         let n = pressure.increments;
         let shares = (1..=n).map(|i| i as f64 / n as f64).collect();
         let approach = Approach::plate(Pose::default());

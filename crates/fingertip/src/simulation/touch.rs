@@ -2,6 +2,7 @@
 
 use super::body::{Body, SimulationError, rotation};
 use super::drive::{Approach, Drive, FORCE_TRAVEL_MAX_MM};
+use super::missed;
 use crate::geometry::fingertip::FingertipShape;
 use crate::indenter::IndenterError;
 use crate::mesh::grading::{Coming, Contact};
@@ -105,8 +106,13 @@ impl Body {
             }),
         };
         let points = self.contact_points_mm(contact);
-        let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points)
-            .map_err(IndenterError::from)?;
+        let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points).map_err(
+            |error| {
+                let narrow = self.spacings(approach) < NODAL_WIDTH_MIN;
+                let apart_mm = self.spacing_mm().filter(|_| narrow);
+                missed::why(approach.shape.as_ref(), (&start, normal), &points, apart_mm, error)
+            },
+        )?;
         // A plate's face is there already, to rounding.
         if travel.abs() > 1e-12 * points.iter().map(|p| norm(*p)).fold(0.0, f64::max) {
             for i in 0..3 {
@@ -147,8 +153,21 @@ impl Body {
 
     /// Width of an indenter over the distance of the skin's nodes.
     fn spacings(&self, approach: &Approach) -> f64 {
-        let contact = self.problem.contact.as_ref();
-        contact.map_or(f64::INFINITY, |c| approach.shape.narrowest_mm() / c.spacing_mm())
+        self.spacing_mm().map_or(f64::INFINITY, |mm| approach.shape.narrowest_mm() / mm)
+    }
+
+    /// Distance of the skin's nodes, mm; none without a skin that may touch.
+    fn spacing_mm(&self) -> Option<f64> {
+        self.problem.contact.as_ref().map(ContactSurface::spacing_mm)
+    }
+
+    /// Width of an indenter and distance of nodes, mm, if contact is at nodes though the indenter is
+    /// narrower than they are apart.
+    pub(crate) fn too_narrow_mm(&self, approach: &Approach) -> Option<[f64; 2]> {
+        let narrow = self.spacings(approach) < 1.0;
+        let is_nodal = self.contact_rule(approach) == ContactRule::Nodal;
+        let spacing_mm = self.spacing_mm().filter(|_| narrow && is_nodal && !self.plane)?;
+        Some([approach.shape.narrowest_mm(), spacing_mm])
     }
 
     /// Undeformed points of the skin that can touch, mm.

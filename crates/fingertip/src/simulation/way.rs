@@ -20,6 +20,9 @@ const STEP_MAX_MM: f64 = 0.5;
 /// tangents, 4 minutes, and no equilibrium; by way of 1.1 mm 71 s in all).
 const GUIDED_STEP_MAX_MM: f64 = 1.1;
 
+/// Equilibria between first touch and the first two stored depths, if these are not far.
+const EXTRA_DEPTHS: [usize; 2] = [5, 1];
+
 /// Least part of the guide's way that is tried at once where the whole leads to no equilibrium.
 const GUIDED_PART_MIN: f64 = 0.25;
 
@@ -201,9 +204,34 @@ fn path_mm(depths_mm: &[f64], i: usize, refinement: u32, graded: bool) -> Vec<f6
     path
 }
 
+/// Equilibria on a straight way through stored depths; on a mesh with a guide fewer.
+pub(crate) fn equilibria(depths_mm: &[f64], guided: bool) -> usize {
+    let longest_mm = if guided { GUIDED_STEP_MAX_MM } else { STEP_MAX_MM };
+    let mut from_mm = 0.0;
+    let to_each = depths_mm.iter().enumerate().map(|(i, &to_mm)| {
+        // As many as in any way to it, or more if it is far.
+        let shallow = 1 + EXTRA_DEPTHS.get(i).copied().unwrap_or(0);
+        let steps = ((to_mm - std::mem::replace(&mut from_mm, to_mm)) / longest_mm - 1e-9).ceil();
+        if guided { shallow.max(steps as usize) } else { path_mm(depths_mm, i, 1, false).len() + 1 }
+    });
+    to_each.sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_way_that_is_far_is_foreseen_to_take_more() {
+        let count = |depths: &[f64]| [false, true].map(|guided| equilibria(depths, guided));
+        assert_eq!(count(&[0.4]), [6, 6]);
+        assert_eq!(count(&[0.25, 0.5, 0.75, 1.0]), [10, 10]);
+        assert_eq!(count(&[3.0]), [8, 6]);
+        assert_eq!(count(&[12.0]), [26, 11]);
+        // As the way is that is taken.
+        let taken: usize = (0..2).map(|i| path_mm(&[2.0, 6.0], i, 1, false).len() + 1).sum();
+        assert_eq!(count(&[2.0, 6.0])[0], taken);
+    }
 
     #[test]
     fn no_step_is_long_however_few_states_are_stored() {

@@ -8,7 +8,7 @@ use super::{CHECKS_FAILED, print};
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options};
 use papilla_fingertip::forecast::{SedError, better};
-use papilla_fingertip::run::{BETTER, Increment};
+use papilla_fingertip::run::{BETTER, Increment, doubts};
 use papilla_fingertip::scene::{Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
@@ -64,6 +64,9 @@ struct Summary {
     /// What was done to meshes to make bodies of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     mended: Vec<String>,
+    /// What may be a mistake.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    doubts: Vec<String>,
     /// True if it was told to end before its last state.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     stopped: bool,
@@ -78,6 +81,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mended = setup.approach.shape.mended();
     for done in &mended {
         eprintln!("{}: {done}", args.scene.display());
+    }
+    let doubts = doubts(&scene, &setup)?;
+    for doubt in &doubts {
+        eprintln!("{}: {doubt}", args.scene.display());
     }
     let maps = FingerMaps::new(&mut setup.body)?;
     let mapped = scene.writes(Output::Maps) || scene.writes(Output::Pictures);
@@ -106,6 +113,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         effort: pressed.iter().fold(Effort::default(), |sum, p| sum.plus(&p.report.effort)),
         sed_error: SedError::of(&scene.geometry),
         mended,
+        doubts,
         stopped: matches!(solved, Err(SimulationError::Halted)),
         increments: pressed.iter().map(|p| Increment::of(p, maps.as_ref())).collect(),
         scene,
