@@ -80,13 +80,7 @@ impl BlockGeometry {
         let m = kind.dilatation_functions();
         let quadrature = kind.quadrature();
         let elements = connectivity.len() / n;
-        let mut value = vec![0.0; n];
-        let mut tables = Vec::new();
-        for q in &quadrature {
-            let mut gradient = vec![[0.0; 3]; n];
-            kind.shape(q.xi, &mut value, &mut gradient);
-            tables.push(gradient);
-        }
+        let tables = gradients_at_points(kind);
         let basis: Vec<_> = quadrature.iter().map(|q| kind.dilatation_basis(q.xi)).collect();
         let mut out = Self {
             kind,
@@ -106,7 +100,7 @@ impl BlockGeometry {
             for (p, q) in quadrature.iter().enumerate() {
                 let (inverse, determinant) =
                     jacobian(conn.iter().map(|&a| nodes[a as usize]), &tables[p]);
-                if !(determinant > 0.0) {
+                if is_folded(determinant) {
                     return Err(ShapeError::Inverted { element: e, point: p, determinant });
                 }
                 let weight = q.weight * determinant;
@@ -140,6 +134,34 @@ impl BlockGeometry {
             basis: &self.basis,
         }
     }
+}
+
+/// Elements of a block that fold: [`BlockGeometry::new`] refuses it if there is one.
+#[must_use]
+pub fn folded(kind: ElementKind, nodes: &[[f64; 3]], connectivity: &[u32]) -> Vec<usize> {
+    let tables = gradients_at_points(kind);
+    let folds = |element: &[u32]| {
+        let of = |table| jacobian(element.iter().map(|&a| nodes[a as usize]), table).1;
+        tables.iter().any(|table| is_folded(of(table)))
+    };
+    let elements = connectivity.chunks_exact(kind.nodes()).enumerate();
+    elements.filter(|(_, element)| folds(element)).map(|(e, _)| e).collect()
+}
+
+/// Whether the map from the reference element folds at a point, by its determinant there; NaN does.
+fn is_folded(determinant: f64) -> bool {
+    !(determinant > 0.0)
+}
+
+/// Gradients of the shape functions in the reference element, `[point][node]`.
+fn gradients_at_points(kind: ElementKind) -> Vec<Vec<[f64; 3]>> {
+    let mut value = vec![0.0; kind.nodes()];
+    let of = |xi| {
+        let mut gradient = vec![[0.0; 3]; kind.nodes()];
+        kind.shape(xi, &mut value, &mut gradient);
+        gradient
+    };
+    kind.quadrature().iter().map(|q| q.xi).map(of).collect()
 }
 
 /// Inverse and determinant of `dX/dxi`; the inverse is `[xi][X]`.
@@ -244,6 +266,7 @@ mod tests {
             new(&nodes, &[0, 3, 2, 1]).unwrap_err(),
             ShapeError::Inverted { element: 0, point: 0, .. }
         ));
+        assert_eq!(folded(ElementKind::Quad4, &nodes, &[0, 1, 2, 3, 0, 3, 2, 1]), [1]);
         nodes[2][2] = 0.1;
         assert_eq!(
             new(&nodes, &[0, 1, 2, 3]).unwrap_err(),

@@ -1,7 +1,7 @@
 //! How well shaped hexahedra are.
 
 use crate::tissue::Tissue;
-use papilla_fem::mesh::{Block, Mesh};
+use papilla_fem::mesh::Mesh;
 
 /// Worst shapes among the elements of one tissue.
 #[derive(Clone, Copy, Debug)]
@@ -42,18 +42,6 @@ pub(super) fn of(mesh: &Mesh, tissue: Tissue) -> Quality {
         }
     }
     quality
-}
-
-/// Elements of a block that are inside out at one of the points where stress is computed: a body
-/// with them is refused ([`papilla_fem::element::ShapeError`]).
-pub(super) fn folded(mesh: &Mesh, block: &Block) -> Vec<usize> {
-    let points = block.kind.quadrature();
-    let is_folded = |e: &usize| {
-        let of = |xi| determinant(&columns(mesh, block.kind, block.element(*e), xi));
-        // NaN is folded.
-        points.iter().any(|q| !(of(q.xi) > 0.0))
-    };
-    (0..block.len()).filter(is_folded).collect()
 }
 
 /// Columns of `dX/dxi` at a point of an element.

@@ -8,8 +8,8 @@
 
 use super::{FingertipMesh, FingertipShapeError, Order, Parts, Resolution};
 use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::quality;
 use crate::mesh::refined::Refined;
+use papilla_fem::element::geometry;
 use std::collections::BTreeSet;
 
 /// Times that cells are halved, and the mesh is made anew, before folds are left as they are.
@@ -41,7 +41,8 @@ pub(super) fn folded(finger: &FingertipMesh) -> BTreeSet<usize> {
         return BTreeSet::new();
     };
     // Elements lie layer by layer below the cells.
-    quality::folded(&finger.mesh, block).into_iter().map(|e| e % cells).collect()
+    let folded = geometry::folded(block.kind, &finger.mesh.nodes, &block.connectivity);
+    folded.into_iter().map(|e| e % cells).collect()
 }
 
 #[cfg(test)]
