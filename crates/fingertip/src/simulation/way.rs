@@ -212,7 +212,9 @@ pub(crate) fn equilibria(depths_mm: &[f64], guided: bool) -> usize {
         // As many as in any way to it, or more if it is far.
         let shallow = 1 + EXTRA_DEPTHS.get(i).copied().unwrap_or(0);
         let steps = ((to_mm - std::mem::replace(&mut from_mm, to_mm)) / longest_mm - 1e-9).ceil();
-        if guided { shallow.max(steps as usize) } else { path_mm(depths_mm, i, 1, false).len() + 1 }
+        // The first touch is one too.
+        let all = path_mm(depths_mm, i, 1, false).len() + 1 + usize::from(i == 0);
+        if guided { shallow.max(steps as usize) } else { all }
     });
     to_each.sum()
 }
@@ -226,11 +228,11 @@ mod tests {
         let count = |depths: &[f64]| [false, true].map(|guided| equilibria(depths, guided));
         assert_eq!(count(&[0.4]), [6, 6]);
         assert_eq!(count(&[0.25, 0.5, 0.75, 1.0]), [10, 10]);
-        assert_eq!(count(&[3.0]), [8, 6]);
+        assert_eq!(count(&[3.0]), [9, 6]);
         assert_eq!(count(&[12.0]), [26, 11]);
         // As the way is that is taken.
         let taken: usize = (0..2).map(|i| path_mm(&[2.0, 6.0], i, 1, false).len() + 1).sum();
-        assert_eq!(count(&[2.0, 6.0])[0], taken);
+        assert_eq!(count(&[2.0, 6.0])[0], taken + 1);
     }
 
     #[test]
