@@ -44,25 +44,28 @@ impl Asked {
 }
 
 /// Poses that touch, those that were flagged as unsettled, and those of them whose rounds settled,
-/// but whose force fell while the object moved further in.
+/// but whose force fell while the object moved further in. Those whose force led along the skin are
+/// flagged too, and counted apart.
 #[derive(Clone, Copy, Default)]
 struct Count {
     touching: usize,
     unsettled: usize,
     faded: usize,
+    aside: usize,
 }
 
 impl Count {
     fn note(&mut self, quality: Quality) {
         self.touching += 1;
-        self.unsettled += usize::from(!quality.settled);
+        self.unsettled += usize::from(!quality.settled && !quality.is_aside);
         self.faded += usize::from(quality.has_faded);
+        self.aside += usize::from(quality.is_aside);
     }
 
     fn told(self, name: &str) -> String {
-        let Self { touching, unsettled, faded } = self;
+        let Self { touching, unsettled, faded, aside } = self;
         let share = 100.0 * unsettled as f64 / touching.max(1) as f64;
-        format!("| {name} | {touching} | {unsettled} | {share:.1} | {faded} |")
+        format!("| {name} | {touching} | {unsettled} | {share:.1} | {faded} | {aside} |")
     }
 }
 
@@ -105,7 +108,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     println!("{poses} poses of seed {seed}, {spacing:?}\n");
-    println!("| poses | touch | unsettled | % | of these, the force fell |\n|---|---|---|---|---|");
+    println!(
+        "| poses | touch | unsettled | % | of these, the force fell | flagged as the force led along the skin |"
+    );
+    println!("|---|---|---|---|---|---|");
     for ((name, ..), count) in shapes.iter().zip(&by_shape) {
         println!("{}", count.told(name));
     }

@@ -40,13 +40,51 @@ pub struct Quality {
     /// Whether the deformation is beyond what the model was made for, or more vertices could
     /// touch than are looked at.
     pub out_of_range: bool,
-    /// Whether the iteration settled, and the force of the only object did not fall while that moved
-    /// further in.
+    /// Whether the iteration settled, the force of the only object did not fall while that moved
+    /// further in, and the skin is not pushed aside.
     pub settled: bool,
     /// Whether it is such a fall alone for which the answer is not settled.
     pub has_faded: bool,
+    /// Whether too much of the force, without friction, leads along the skin.
+    pub is_aside: bool,
     /// Whether a body lies so deep, or is so thin, that it is held on the side from which it came.
     pub is_held: bool,
+    /// Whether a body lies in the finger where nothing was found to press: between vertices, or in its
+    /// back.
+    pub is_missed: bool,
+}
+
+/// Part of the force into the skin that may lead along it, and what is always allowed, N: blunt bodies
+/// stay below half of that part.
+const ASIDE_MAX: f64 = 0.3;
+const ASIDE_N: f64 = 1e-3;
+
+/// Sums of the forces of a frame without friction, along the skin and into it, N. Skin without friction
+/// is pushed along its own normal. The forces here have the normals of objects, which at an edge between
+/// vertices or pixels are those of one face alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Aside {
+    along_n: [f64; 3],
+    into_n: f64,
+}
+
+impl Aside {
+    /// Adds a force where the skin has this outward normal.
+    pub(crate) fn add(&mut self, force_n: [f64; 3], skin: [f32; 3]) {
+        let skin = skin.map(f64::from);
+        let out_n: f64 = (0..3).map(|i| force_n[i] * skin[i]).sum();
+        self.into_n -= out_n;
+        for i in 0..3 {
+            self.along_n[i] += force_n[i] - out_n * skin[i];
+        }
+    }
+
+    /// Takes note of whether too much leads along the skin.
+    pub(crate) fn judge(self, quality: &mut Quality) {
+        let along_n = self.along_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        quality.is_aside = along_n > ASIDE_N + ASIDE_MAX * self.into_n.max(0.0);
+        quality.settled &= !quality.is_aside;
+    }
 }
 
 /// What a frame took.
@@ -190,7 +228,7 @@ pub(crate) fn collect(
     out: &mut Contact,
 ) {
     let v = &patch.values;
-    let mut size_n = 0.0;
+    let (mut size_n, mut aside) = (0.0, Aside::default());
     for slot in 0..patch.near() {
         let size = f64::from(v.size[slot]);
         if !(size > 0.0) {
@@ -207,9 +245,14 @@ pub(crate) fn collect(
         let at = std::array::from_fn(|i| {
             model.positions_mm[vertex as usize][i] + f64::from(v.moved[i][slot])
         });
-        out.add(at, [0, 1, 2].map(|i| f64::from(v.found[i][slot])), size, area);
+        let found = [0, 1, 2].map(|i| v.found[i][slot]);
+        let shear = shear_n(slot);
+        aside
+            .add([0, 1, 2].map(|i| f64::from(found[i] - shear[i])), model.normals[vertex as usize]);
+        out.add(at, found.map(f64::from), size, area);
         size_n += size;
     }
+    aside.judge(&mut out.quality);
     out.finish(person, size_n);
 }
 

@@ -25,7 +25,9 @@ struct Ball {
 impl Clusters {
     pub(crate) fn new(points_mm: &[[f64; 3]]) -> Self {
         let mut built = Self { balls: Vec::new(), order: (0..points_mm.len() as u32).collect() };
-        built.split(points_mm, 0, points_mm.len());
+        if !points_mm.is_empty() {
+            built.split(points_mm, 0, points_mm.len());
+        }
         built
     }
 

@@ -86,7 +86,9 @@ impl Solver {
             let how = Search::AT_VERTICES;
             let travel = solver.travel_until(view, net, how, (&mut effort, out), Self::frame)?;
             let shift_mm = net.direction.map(|d| d * travel / view.length);
-            solver.follow_slip(View { shift_mm, ..view });
+            let view = View { shift_mm, ..view };
+            solver.tell_missed(view, true, out);
+            solver.follow_slip(view);
             Ok(travel)
         })
     }

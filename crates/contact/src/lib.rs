@@ -27,6 +27,7 @@
 //! ```
 
 mod answer;
+mod back;
 mod bounded;
 mod budget;
 mod clusters;

@@ -1,5 +1,6 @@
 //! The contact model: what is known of a finger before anything touches it.
 
+use crate::back::Back;
 use crate::clusters::Clusters;
 use crate::compliance::Compliance;
 use crate::error::ModelError;
@@ -101,6 +102,7 @@ pub struct ContactModel {
     pub(crate) border: Vec<bool>,
     /// The lowest vertex, where the pad is.
     pub(crate) lowest: u32,
+    pub(crate) back: Back,
     /// Ends of the skin along x, y and z, mm.
     ends_mm: [[f64; 2]; 3],
 }
@@ -144,6 +146,7 @@ impl ContactModel {
         });
         let positions_mm: Vec<[f64; 3]> =
             triples(&arrays.positions_mm).into_iter().map(|p| p.map(f64::from)).collect();
+        let normals = triples(&arrays.normals);
         let slopes = slopes(&positions_mm, &triangles);
         let border = border(v, &triangles);
         let lowest = (0..v).min_by(|a, b| positions_mm[*a][2].total_cmp(&positions_mm[*b][2]));
@@ -157,8 +160,6 @@ impl ContactModel {
             rank[vertex as usize] = column as u32;
         }
         Ok(Self {
-            positions_mm,
-            normals: triples(&arrays.normals),
             areas_mm2: arrays.areas_mm2,
             triangles,
             compliance: Compliance::unpacked(
@@ -172,6 +173,9 @@ impl ContactModel {
             around,
             border,
             lowest: lowest.unwrap_or(0) as u32,
+            back: Back::of(&positions_mm, &normals),
+            normals,
+            positions_mm,
             ends_mm,
             header,
         })
@@ -198,6 +202,19 @@ impl ContactModel {
     /// Whether a place lies between the ends of the skin.
     pub(crate) fn is_between_ends(&self, at_mm: [f64; 3]) -> bool {
         (0..3).all(|i| (self.ends_mm[i][0]..=self.ends_mm[i][1]).contains(&at_mm[i]))
+    }
+
+    /// Places between a vertex and its neighbours, mm: middles of sides, and of triangles.
+    pub(crate) fn beside(&self, vertex: u32) -> impl Iterator<Item = [f64; 3]> {
+        self.around[vertex as usize].iter().flat_map(move |triangle| {
+            let corners = self.triangles[*triangle as usize];
+            let place = |corner: u32| self.positions_mm[corner as usize];
+            let [a, b, c] = corners.map(place);
+            let next = corners.iter().position(|corner| *corner == vertex).unwrap_or(0) + 1;
+            let (own, next) = (place(vertex), place(corners[next % 3]));
+            let side = std::array::from_fn(|i| 0.5 * (own[i] + next[i]));
+            [side, std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0)]
+        })
     }
 
     /// How far the box round the skin goes along a direction, mm from the origin.

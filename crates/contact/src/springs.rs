@@ -4,7 +4,7 @@
 //! in the object and the greatest depth `d_max`. How the constants were fitted:
 //! `studies/reports/penetration.md`.
 
-use crate::answer::{Contact, Person};
+use crate::answer::{Aside, Contact, Person};
 use crate::model::ContactModel;
 use crate::objects::View;
 
@@ -29,7 +29,7 @@ pub(crate) fn press(
         (at, view.nearest(model, vertex as usize, [0.0; 3]))
     };
     let deepest = candidates.iter().map(|v| -depth(v).1.gap_mm).fold(0.0, f64::max);
-    let (mut size_n, mut turned_n) = (0.0, 0.0);
+    let (mut size_n, mut turned_n, mut aside) = (0.0, 0.0, Aside::default());
     for candidate in candidates {
         let (at, nearest) = depth(candidate);
         let vertex = candidate.1;
@@ -39,15 +39,18 @@ pub(crate) fn press(
             let area = f64::from(model.areas_mm2[vertex as usize]);
             let size = pressure / person.stiffness * area * 1e-6;
             out.press(vertex, pressure as f32);
-            out.add(at, nearest.normal.map(|n| size * n), size, area);
+            let force = nearest.normal.map(|n| size * n);
+            out.add(at, force, size, area);
             size_n += size;
             let skin = model.normals[vertex as usize];
+            aside.add(force, skin);
             let facing: f64 = (0..3).map(|i| f64::from(skin[i]) * nearest.normal[i]).sum();
             turned_n += if facing > TURNED { size } else { 0.0 };
         }
     }
     // Skin deep in what is narrow is nearer to its sides: springs push it there.
     out.quality.settled &= turned_n <= TURNED_MAX * size_n;
+    aside.judge(&mut out.quality);
     view.count(2 * candidates.len() as u32, &mut out.effort);
     out.penetration_mm = deepest;
     out.finish(person, size_n);

@@ -330,7 +330,7 @@ impl Finger {
         let told = |on: bool, flag: u8| if on && is_solved { flag } else { 0 };
         let flags = told(quality.out_of_range, flags::OUT_OF_RANGE)
             | told(!quality.settled, flags::UNSETTLED)
-            | if peak_pa > 0.0 || quality.is_held { 0 } else { flags::NO_CONTACT };
+            | if peak_pa > 0.0 || self.holds_a_body() { 0 } else { flags::NO_CONTACT };
         let iterations = is_solved.then_some(self.out.effort.iterations);
         let felt = self
             .plain_method
@@ -357,11 +357,13 @@ impl Finger {
         })
     }
 
-    /// Whether a body in the finger is held on the side from which it came: it touches, even if no force
-    /// was found.
+    /// Whether a body in the finger is held on the side from which it came, or lies where nothing was found
+    /// to press: it touches, even if no force was found.
     #[must_use]
     pub fn holds_a_body(&self) -> bool {
-        self.form.input != Input::Pressure && self.out.quality.is_held && !self.is_lost
+        let quality = self.out.quality;
+        let is_in = quality.is_held || quality.is_missed;
+        self.form.input != Input::Pressure && is_in && !self.is_lost
     }
 
     fn pixels(&self) -> Option<&PixelContact> {

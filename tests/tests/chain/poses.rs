@@ -6,7 +6,9 @@ mod thrown;
 
 use std::sync::Arc;
 
-use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Settings, Solver, WORK_MAX};
+use papilla_contact::{
+    Contact, Object, PixelContact, PixelSpacing, Quality, Settings, Solver, WORK_MAX,
+};
 use papilla_proto::{
     atlas::{Atlas, MAP_SIDE_PX, Patch, Raster},
     sdf::{Placement, RoundedPlate},
@@ -88,7 +90,9 @@ fn a_plate_beside_the_map_settles_within_half_its_budget() {
     solver.solve_on_pixels(&[object], &mut pixels, &mut out).unwrap();
     let told = format!("{:?} {:?}", out.quality, out.effort);
     println!("{told}");
-    assert!(out.quality.settled && pixels.peak_pa() > 0.0, "{told}");
+    // It goes through the finger from the side of the nail, and the answer says so.
+    let Quality { settled, is_aside, is_missed, .. } = out.quality;
+    assert!((settled || is_aside) && is_missed && pixels.peak_pa() > 0.0, "{told}");
     assert!(out.effort.work < WORK_MAX / 2, "{told}");
 }
 

@@ -50,12 +50,13 @@ mod turns;
 mod window;
 
 use crate::PA_PER_MPA;
-use crate::answer::{Contact, Effort, Person};
+use crate::answer::{Aside, Contact, Effort, Person};
 use crate::bounded::BoundedSolver;
 use crate::error::ContactError;
 use crate::force_target::{NetForce, Search};
 use crate::model::ContactModel;
 use crate::object::Object;
+use crate::objects::View;
 use crate::second_order::Amplitudes;
 use crate::solver::{Solver, Until};
 use careful::Careful;
@@ -126,7 +127,9 @@ impl Solver {
             (solver.sides.toward, solver.sides.fine) = (None, true);
             solver.frame_until(Until::within(AT_VERTICES_MM), view, out)?;
             pixels.refine(solver, solver.held(view), out)?;
-            solver.end_frame(view, out);
+            // Under a single pixel without neighbours there is no area.
+            let is_met = pixels.peak_pa > 0.0 && !out.touched().is_empty();
+            solver.end_frame(view, is_met, out);
             Ok(())
         })
     }
@@ -158,6 +161,8 @@ impl Solver {
                 solver.frame_until(Until::within(AT_VERTICES_MM), view, out)?;
                 pixels.refine(solver, solver.held(view), out)
             })?;
+            let shift_mm = net.direction.map(|d| d * travel / view.length);
+            solver.tell_missed(View { shift_mm, ..view }, true, out);
             solver.follow_slip(view);
             Ok(travel)
         })
@@ -239,13 +244,16 @@ impl PixelContact {
         let Contact { quality, effort, stiffness_n_per_mm, .. } = *out;
         out.clear();
         (out.quality, out.effort, out.stiffness_n_per_mm) = (quality, effort, stiffness_n_per_mm);
-        let mut size_n = 0.0;
+        let (mut size_n, mut aside) = (0.0, Aside::default());
         for (i, p) in pressure[..window.len()].iter().enumerate() {
             if !(*p > 0.0) {
                 continue;
             }
             let size = f64::from(p * window.area_mm2[i]);
             let mut push = window.normal[i];
+            let entry = window.entries[i] as usize;
+            let vertex = skin.raster.pixels()[entry].vertices[0] as usize;
+            aside.add(push.map(|n| f64::from(n) * size), model.normals[vertex]);
             if rubbing.is_rough() {
                 let along = rubbing.ratio(skin, window, i);
                 push.iter_mut().zip(along).for_each(|(push, along)| *push += along);
@@ -254,7 +262,7 @@ impl PixelContact {
             out.add(window.at_mm[i].map(f64::from), force, size, f64::from(window.area_mm2[i]));
             size_n += size;
             out.penetration_mm = out.penetration_mm.max(f64::from(p * window.give[i]));
-            let index = skin.raster.indices()[window.entries[i] as usize];
+            let index = skin.raster.indices()[entry];
             held_pa[index as usize] = p * unit_pa;
             window.spread(skin, i, p * unit_pa, map_pa);
             shown.take(index as usize);
@@ -275,6 +283,7 @@ impl PixelContact {
                 }
             }
         }
+        aside.judge(&mut out.quality);
         out.finish(person, size_n);
         if let Some((strength, slope)) = strength {
             out.strengthen(strength, slope / person.width);

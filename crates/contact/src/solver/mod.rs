@@ -11,6 +11,7 @@ mod candidates;
 mod friction;
 mod iteration;
 mod memory;
+mod missed;
 mod sides;
 
 use crate::answer::{Contact, Effort, Person, collect};
@@ -273,7 +274,7 @@ impl Solver {
         self.within(scene.into(), KEPT_MM as f32, |solver, view| {
             (solver.sides.toward, solver.sides.fine) = (None, false);
             solver.frame(view, out)?;
-            solver.end_frame(view, out);
+            solver.end_frame(view, !out.touched().is_empty(), out);
             Ok(())
         })
     }
@@ -289,8 +290,10 @@ impl Solver {
         self.sides.view(view)
     }
 
-    /// Ends a frame of things in given places: force that has fallen on a straight way in is told.
-    pub(crate) fn end_frame(&mut self, view: View<'_>, out: &mut Contact) {
+    /// Ends a frame of things in given places: force that has fallen on a straight way in is told, and
+    /// so are bodies that lie in the finger although none is met.
+    pub(crate) fn end_frame(&mut self, view: View<'_>, is_met: bool, out: &mut Contact) {
+        self.tell_missed(view, is_met, out);
         out.quality.has_faded = self.sides.has_faded(out.force_n, out.quality.settled);
         out.quality.settled &= !out.quality.has_faded;
         self.follow_slip(view);

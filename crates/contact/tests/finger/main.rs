@@ -4,15 +4,18 @@
 
 mod budget;
 mod deep;
+mod edges;
 mod pieces;
 mod support;
 
-use papilla_contact::{Arrays, Contact, Gaps, Header, Object, Settings, Solver};
+use papilla_contact::{Arrays, Contact, Gaps, Header, Object, Quality, Settings, Solver};
 use support::{Finger, Throw, arrays, shapes};
 
 const POSES: usize = 10_000;
 /// Plate, balls, punch and box.
 const WIDE: [usize; 5] = [0, 1, 2, 5, 9];
+/// Plate and balls.
+const ROUND: [usize; 3] = [0, 1, 2];
 /// Linearisations of a frame: 16 steps of 3 and 25, twice if it starts anew.
 const ITERATIONS_MAX: u32 = 2 * (16 * 3 + 25);
 
@@ -38,6 +41,7 @@ fn any_pose_of_any_shape_is_answered() {
     let mut shape = 0;
     let (mut touching, mut unsettled, mut outside) = (0, 0, 0);
     let (mut wide, mut wide_unsettled, mut deep, mut deep_told) = (0, 0, 0, 0);
+    let (mut round, mut round_aside) = (0, 0);
     for pose in 0..POSES {
         if random.u8(..3) == 0 {
             now = throw(&mut random, &finger);
@@ -74,14 +78,20 @@ fn any_pose_of_any_shape_is_answered() {
         if WIDE.contains(&shape) && objects.len() == 1 && pressed {
             let is_deep = nearest < -f64::from(finger.model.header().depth_max_mm);
             *if is_deep { &mut deep } else { &mut wide } += 1;
-            wide_unsettled += usize::from(!is_deep && !out.quality.settled);
+            let Quality { settled, is_aside, .. } = out.quality;
+            // Edges, and what reaches beyond where the skin ends, push it aside.
+            wide_unsettled += usize::from(!is_deep && !settled && !is_aside);
+            round += usize::from(!is_deep && ROUND.contains(&shape));
+            round_aside += usize::from(!is_deep && ROUND.contains(&shape) && is_aside);
             deep_told += usize::from(is_deep && !judged);
         }
     }
     println!("{touching} of {POSES} touch, {unsettled} unsettled, {outside} out of range");
     println!("wide: {wide_unsettled} of {wide} unsettled; deep: {deep_told} of {deep} flagged");
+    println!("plate and balls: {round_aside} of {round} aside");
     assert!(touching > POSES / 3 && unsettled < touching / 2, "{touching} {unsettled}");
     assert!(4 * wide_unsettled < wide, "{wide_unsettled} of {wide}");
+    assert!(12 * round_aside < round, "{round_aside} of {round}");
     assert!(deep > 50 && deep_told == deep, "{deep_told} of {deep}");
 }
 

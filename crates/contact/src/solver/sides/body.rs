@@ -1,5 +1,6 @@
 //! Whether a body is held, and on which side.
 
+use super::anew::{Anew, MOTION_MM};
 use super::depth::{BEHIND_MM, FACING};
 use super::look::{Asked, PASSED, Sweep};
 use super::{EXACT_MM, Side, Survey, trusted_mm, unit};
@@ -12,12 +13,8 @@ const NEARBY_MM: f64 = 0.8;
 const BETWEEN_MM: f64 = 0.7;
 /// So many times as deep as is trusted, a body may as well have come from elsewhere.
 const FAR_BEHIND: f64 = 2.0;
-/// So many times as deep as is trusted, a body in a first frame may lie behind the pad.
-const FIRST: f64 = 3.0;
 /// Of so many times the trusted depth in one frame it may have jumped to another side.
 const JUMP: f64 = 3.0;
-/// Least motion that tells from where a body came, reference mm.
-const MOTION_MM: f64 = 1.0;
 /// By how much a body narrower than the vertices are apart is too wide, mm.
 const WIDER_MM: f64 = 0.05;
 
@@ -63,15 +60,12 @@ impl Asked<'_> {
         if let Some(judged) = self.witness_passed(vertex, effort) {
             return judged;
         }
-        let is_unsure = self.pad_is_behind(effort);
-        if is_unsure {
-            let pad = self.normal(self.model.lowest);
-            let sweep = self.sweep(pad, 0.0, effort);
-            if sweep.any_met && sweep.depth_mm <= FIRST * trusted_mm(self.model) {
-                return self.hold(pad, sweep, 0.0, true);
-            }
-        }
         let way = unit(survey.sum).unwrap_or(skin);
+        let is_unsure = match self.meet_anew(way, effort) {
+            Anew::Passed(way, sweep) => return self.hold(way, sweep, 0.0, true),
+            Anew::Unsure => true,
+            Anew::Plain => false,
+        };
         let (deep, is_narrow) = self.depth(way, vertex, [depth_mm, facing], effort);
         if deep > trusted_mm(self.model) + EXACT_MM || is_narrow {
             let sweep = self.sweep(way, 0.0, effort);
@@ -81,17 +75,6 @@ impl Asked<'_> {
         }
         let side = Side { way: Some(way), witness: Some(vertex), ..Side::default() };
         (Side { is_guess: is_unsure, ..side }, None)
-    }
-
-    /// Whether the pad lies behind a body of which nothing is known yet.
-    fn pad_is_behind(&self, effort: &mut Effort) -> bool {
-        if self.past.origin_mm.is_some() {
-            return false;
-        }
-        let pad = self.model.lowest;
-        let (_, normal) = self.nearest(pad, effort);
-        let skin = self.normal(pad);
-        dot(normal, skin) > 0.5 && matches!(self.front(pad, skin, 0.0), Front::Met { .. })
     }
 
     /// Judges a body in which no vertex lies.

@@ -12,7 +12,7 @@ pub(super) const SLANT: f64 = 0.7;
 /// Beyond what a ray has to lie before a vertex counts as passed, mm.
 const BESIDE_MM: f64 = 0.02;
 /// Cosine between the way out and the normals of the skin that a body can have come through.
-const THROUGH: f64 = 0.1;
+pub(super) const THROUGH: f64 = 0.1;
 /// Cosine between the skin's and a body's outward normals above which the body has passed the skin.
 pub(super) const PASSED: f64 = 0.3;
 

@@ -8,6 +8,7 @@
 //! answer says so. Objects that touch are [one body](joined), as the parts of a union are: their ways
 //! are one, and all of them are held or none.
 
+mod anew;
 mod body;
 mod depth;
 mod fading;
