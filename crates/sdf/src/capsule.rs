@@ -1,4 +1,4 @@
-//! Lying capsule.
+//! Indenter `capsule`: a bar along y that ends in half balls, and its signed distance.
 
 use super::Cylinder;
 use super::rules::{BadValue, length, require};

@@ -1,4 +1,4 @@
-//! Box with rounded edges.
+//! Indenter `box`: a box with rounded edges, and its signed distance.
 
 use super::RoundedPlate;
 use super::rules::{BadValue, lengths, rounding};

@@ -1,4 +1,4 @@
-//! Lying cylinder.
+//! Indenter `cylinder`: a bar along y with rounded ends, and its signed distance.
 
 use super::beneath::tangents;
 use super::revolved::{Rectangle, disc_reach_mm, revolve};

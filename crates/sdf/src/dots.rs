@@ -1,4 +1,4 @@
-//! Braille-like dots.
+//! Indenter `dots`: spherical caps on a plate, such as a Braille cell, and its signed distance.
 
 use super::grating::{COUNT_MAX, from_nearest};
 use super::plate::Plate;

@@ -1,4 +1,4 @@
-//! Grating.
+//! Indenter `grating`: parallel ridges on a plate, and its signed distance.
 
 use super::plate::THICKNESS_MM;
 use super::rules::{BadValue, length, require, rounding};

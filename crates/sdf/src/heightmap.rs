@@ -1,4 +1,5 @@
-//! Surface from a picture.
+//! Indenter `heightmap`: a plate whose face is a gray picture or a list of heights, and its signed
+//! distance.
 
 use super::rules::{BadValue, ShapeError, length, lengths, require};
 use super::{Distance, SignedDistance};

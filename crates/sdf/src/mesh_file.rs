@@ -1,4 +1,4 @@
-//! A mesh from a file.
+//! Indenter `mesh` of a scene: triangles from an STL, OBJ, PLY or GLB file, in the unit it names.
 
 use super::Mesh;
 use super::mesh::{MeshError, TRIANGLES_MAX};

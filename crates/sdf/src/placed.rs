@@ -1,4 +1,4 @@
-//! Indenters moved and turned.
+//! A shape in its place: the rotation and translation from its own axes to those of the finger.
 
 use super::{Distance, SignedDistance};
 use std::sync::Arc;

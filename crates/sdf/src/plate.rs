@@ -1,4 +1,4 @@
-//! Rectangular plate with rounded edges.
+//! Indenter `plate`: a flat plate with rounded edges, and its signed distance.
 
 use super::rules::{BadValue, lengths, require};
 use super::{Distance, SignedDistance};

@@ -1,4 +1,4 @@
-//! Flat circular punch.
+//! Indenter `punch`: an upright cylinder with a flat end, and its signed distance.
 
 use super::beneath::tangents;
 use super::revolved::{Rectangle, disc_reach_mm, revolve};

@@ -1,4 +1,4 @@
-//! End of a tube.
+//! Indenter `ring`: the end of an upright tube, and its signed distance.
 
 use super::beneath::tangents;
 use super::revolved::{Rectangle, disc_reach_mm, revolve};

@@ -1,4 +1,4 @@
-//! Rules for dimensions.
+//! Checks the dimensions of indenters, and names the field of one that makes no shape.
 
 use std::fmt::Debug;
 use std::path::PathBuf;

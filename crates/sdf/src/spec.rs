@@ -1,4 +1,4 @@
-//! Indenters in scenes and campaigns.
+//! The table of a scene or campaign that describes an indenter, and the shape that it stands for.
 
 use super::rules::{BadValue, ShapeError, parts, placed, require};
 use super::{

@@ -1,4 +1,4 @@
-//! Rigid sphere.
+//! Indenter `sphere`: a ball, and its signed distance.
 
 use super::beneath::tangents;
 use super::rules::{BadValue, length};

@@ -1,4 +1,4 @@
-//! Torus.
+//! Indenter `torus`: a ring of round section that lies flat, and its signed distance.
 
 use super::beneath::tangents;
 use super::revolved::{Flat, revolve};

@@ -1,4 +1,4 @@
-//! Several parts as one indenter.
+//! Indenter `union`: several parts that move as one body, and their signed distance.
 
 use super::beneath::{beneath, may_be_covered};
 use super::{Distance, Placed, SignedDistance};

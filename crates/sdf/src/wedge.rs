@@ -1,4 +1,4 @@
-//! Wedge.
+//! Indenter `wedge`: a blunt edge along y, and its signed distance.
 
 use super::revolved::Flat;
 use super::rules::{BadValue, length, require, rounding};

@@ -13,7 +13,7 @@
 //! a narrow contact. [`Faces`] holds the strain of each face, of which SED is the mean
 //! of sums of squares, exactly as recorded.
 //!
-//! In prose: `docs/concepts/networks.md`.
+//! In prose: `docs/reference/operator.md`.
 
 mod build;
 mod compliance;

@@ -1,4 +1,4 @@
-//! Triangle meshes.
+//! Signed distance to a body that triangles bound.
 //!
 //! The sign of the distance is that of the angle-weighted normal of the nearest face, edge or
 //! corner (Baerentzen & Aanaes, *Signed distance computation using the angle weighted
