@@ -306,8 +306,8 @@ type 1) can be computed from pressure. How wrong are they if pressure is not kno
 array of taxels (the cells of a pressure sensor)? The [glossary](../../docs/glossary.md) explains terms.
 
 **What it means.** The pitch of the taxels matters most. Even at 1 mm the error of SED is several times that of the
-network alone, under wide plates and balls about half as large as under all shapes. The smoothest field has the least
-error of SED, the nearest taxel in most rows the least error of force. Noise adds to the error of force and hardly to that of SED.
+network alone. Under wide plates and balls it is about half as large as the median over all shapes. The
+smoothest field has the least error of SED, and the nearest taxel in most rows the least error of force. Noise adds to the error of force and hardly to that of SED.
 From a pitch of 2 mm on, most SA1 afferents seem silent: an error of 100 % says that none seems to fire.
 
 **Method.** {states} states of the finite-element (FE) solver are read by virtual arrays. No network was trained on these

@@ -43,7 +43,8 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "{}Computed on {}. {}. Spheres are pressed on the mesh `{}`, plates on `coarse`. Both are \
+            "{}Computed on {}. {}. The mesh of the spheres is `{}`, and that of the plates `coarse`. \
+             Both are \
              [graded](../../docs/reference/scenes.md#geometry), unless the table above names the even mesh.\n\n## Rows\n\n| quantity | the model | measured | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
             HEAD.replace("DENSITY", density(self.density)),
             self.made,
