@@ -365,7 +365,7 @@ def terminate_under(kind: str, certificate: str | None, service: subprocess.Pope
 KINDS = """| four clients send | which is |
 |---|---|
 | windows | frames of 4 x 4 pixels |
-| whole maps | frames of 128 x 128 pixels, as the session of 90 Hz sends them |
+| whole maps | frames with the whole window of 128 x 128 pixels, as the session of 90 Hz sends them |
 | pings, pongs; the same before the hello | control messages of WebSocket, in an open session or before its first message |
 | hellos of 1 MB | first messages that are too long |
 | pieces of nothing | a message in endless empty parts |
@@ -382,7 +382,7 @@ def markdown(found: dict) -> str:
         "**Question.** Does a well-behaved session notice other clients that flood the service?",
         "",
         f"**Method.** Four clients of a kind send without a pause beside one session of {RATE_HZ} Hz (`nano`, a window of 128 x 128",
-        "pixels, samples u8), and beside a balancer that asks for `/healthz` on connections of its own. For comparison, just",
+        "pixels, samples of 8 bits), and beside a balancer that asks for `/healthz` on connections of its own. For comparison, just",
         "before each kind four sessions that send nothing take the place of the four clients (*idle*). A kind is *sound* if three conditions are met:",
         "",
         "- the session loses no frame;",

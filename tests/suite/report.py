@@ -16,10 +16,11 @@ PAGE = Path("docs/reports/tests.md")
 INTRODUCTION = """# Tests: when each part last ran
 
 `./test --record` writes this page, also together with `--fast` or `--all`. It notes each part that
-it ran, and leaves all other rows as they are. A row tells how the part ended at the named commit. A
-part that failed there may work again since then: `git log docs/reports/tests.md` says so if it is
-known. [Testing](../guides/testing.md) explains the options. Processor seconds count all processes of
-a part.
+it ran, and leaves all other rows as they are. A row tells how the part ended at the named commit.
+If it failed there, it may work again by now: the messages of `git log docs/reports/tests.md` may
+say so. What the parts do that never ran is listed by `./test --all --list`.
+[Testing](../guides/testing.md) explains the options. Processor seconds count all processes of a
+part.
 
 | part | of | last run | commit | processor | outcome | tests | wall, s | processor, s |
 |---|---|---|---|---|---|---|---|---|

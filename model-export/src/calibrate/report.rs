@@ -28,9 +28,9 @@ pub fn markdown(outcome: &Outcome, stem: &str) -> String {
     }
     text.push_str("\n## All errors\n\n");
     text.push_str(
-        "One row for each error that is stated, over all sets that are not set aside, by laws of other\n\
-         simulations. The last columns are the share of true errors below the bound in the sets set aside,\n\
-         and the least share that a group of sets reaches.\n\n\
+        "One row for each error that is stated, over all sets that are not set aside. Each simulation is\n\
+         checked by laws that were fitted to other simulations. The last columns are the share of true errors\n\
+         below the bound in the sets set aside, and the least share that a group of sets reaches.\n\n\
          | error | answers | stated | true median, % | bound, median, % | bound over median | below the median, % | \
          below the bound, % | set aside: below the bound, % | least of a group, % |\n\
          |---|---|---|---|---|---|---|---|---|---|\n",

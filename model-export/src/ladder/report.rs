@@ -24,8 +24,8 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
             text,
             "The SED of the reference itself errs by about {} (relative L2 norm). This was estimated by {}\n\
              ([more](../concepts/accuracy.md#two-truths)). On the sets whose truth is the reference, smaller differences between\n\
-             ways mean nothing. On all others a smaller difference says which way is nearer to the teacher, and not which is\n\
-             nearer to the truth.\n",
+             ways mean nothing. On all others a smaller difference says which way is nearer to the teacher. It does\n\
+             not say which is nearer to the reference.\n",
             percent(floor.sed_relative_l2),
             floor.how
         );
@@ -85,10 +85,10 @@ fn readings(text: &mut String, found: &Readings) {
         "## What a pressure map is worth\n\n\
          Each of {} states of the reference was solved on two meshes, its own and `{}`, which gives two pressure\n\
          maps of the same state. The table compares the two pressure maps, and each network's two answers.\n\
-         A network can only know the map that it is given. If it answered one of the two exactly, it would err with the other\n\
-         by about the difference between its two answers. Training could lessen only what is systematic in this difference,\n\
-         which was not tried. Smoothing takes away half of the difference of the pressure maps: so half of it is in detail\n\
-         finer than some 0.1 mm.\n\n\
+         A network can only know the map that it is given. Suppose that its answer to one of the two maps is exactly right.\n\
+         Then its answer to the other map is wrong by about the difference between the two answers. Training could lessen only\n\
+         what is systematic in this difference, which was not tried. Smoothing takes away half of the difference of the\n\
+         pressure maps: so half of it is in detail finer than some 0.1 mm.\n\n\
          | relative L2 between the two | median | p95 |\n|---|---|---|\n",
         found.states, found.mesh
     );

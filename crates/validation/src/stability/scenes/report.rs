@@ -97,9 +97,9 @@ impl ScenesReport {
             "# Random scenes\n\n\
              **Question.** Does every random scene converge and balance ([method and \
              command](stability.md#random-scenes))?\nThe [glossary](../glossary.md) explains terms. \
-             These scenes: {of} (`--scenes {scenes} --seed {}`).\n\n\
-             | | last run of each scene | first run, of the {counted} scenes with which the solver was not \
-             improved |\n\
+             This page has the scenes of the campaign {of} (`--scenes {scenes} --seed {}`).\n\n\
+             | | last run of each scene | first run of the {counted} scenes that were not used to \
+             improve the solver |\n\
              |---|---|---|\n| scenes | {scenes} | {counted} |\n\
              | converged, every balance kept | {} | {} |\n",
             of.seed, now.balanced, first_run.balanced
@@ -135,7 +135,8 @@ impl ScenesReport {
             ),
         };
         out += "\nIterations are those of Newton's method on the path that was kept. Times are processor \
-                times of all paths\nof a scene; on which processor was not recorded.\n\n";
+                times of all paths\nof a scene; on which processor was not recorded. *With halved steps* are scenes in which the \
+                solver halved a\nstep of the path.\n\n";
         out += &table::markdown(&self.indenters);
         let failures: Vec<_> = [("first run", first_run), ("now", now)]
             .into_iter()
