@@ -59,11 +59,12 @@ export async function readMesh(bytes, name, { unit, axes = 'file' } = {}) {
   const factor = factorOf(vertices, ending === 'glb' ? 'm' : 'mm', unit, name);
   const scaled = (/** @type {Three} */ p) => /** @type {Three} */ (p.map((x) => factor * x));
   const turned = (/** @type {Three} */ p) => vertexMm(/** @type {Three} */ (scaled(p).map((x) => x / UNITS.m)));
-  // To 0.1 um: more digits would only fill the hello.
-  const short = (/** @type {Three} */ p) => /** @type {Three} */ (p.map((x) => Math.round(1e4 * x) / 1e4));
-  const placed = axes === 'scene' ? turned : scaled;
+  const placed = vertices.map(axes === 'scene' ? turned : scaled);
+  // To 0.1 um: more digits would only fill the hello. A body below 1 mm, whose unit may be wrong, gets more.
+  const digits = Math.min(20, Math.max(4, 4 - Math.floor(Math.log10(sideOf(placed)))));
+  const short = (/** @type {Three} */ p) => /** @type {Three} */ (p.map((x) => Number(x.toFixed(digits))));
   /** @type {MeshShape} */
-  const shape = { shape: 'mesh', vertices_mm: vertices.map((p) => short(placed(p))), triangles };
+  const shape = { shape: 'mesh', vertices_mm: placed.map(short), triangles };
   const size = JSON.stringify(shape).length;
   if (size > SHAPE_BYTES_MAX) {
     throw bad(`${name} takes ${size} bytes with its ${triangles.length} triangles; a hello has room for ${SHAPE_BYTES_MAX}: reduce it first`);
@@ -131,6 +132,16 @@ function joined(geometries) {
   return { vertices, triangles };
 }
 
+/** The longest side of their box. @param {Three[]} vertices */
+function sideOf(vertices) {
+  const side = (/** @type {number} */ axis) => {
+    let [low, high] = [Infinity, -Infinity];
+    for (const vertex of vertices) [low, high] = [Math.min(low, vertex[axis]), Math.max(high, vertex[axis])];
+    return high - low;
+  };
+  return Math.max(side(0), side(1), side(2));
+}
+
 /**
  * Millimetres of one unit of the file. @param {Three[]} vertices @param {'m' | 'mm'} own @param {keyof typeof UNITS | undefined} unit
  * @param {string} name
@@ -140,12 +151,7 @@ function factorOf(vertices, own, unit, name) {
     if (!(unit in UNITS)) throw bad(`the unit '${unit}' is none of ${Object.keys(UNITS).join(', ')}`);
     return UNITS[unit];
   }
-  const side = (/** @type {number} */ axis) => {
-    let [low, high] = [Infinity, -Infinity];
-    for (const vertex of vertices) [low, high] = [Math.min(low, vertex[axis]), Math.max(high, vertex[axis])];
-    return high - low;
-  };
-  const sizeMm = Math.max(side(0), side(1), side(2)) * UNITS[own];
+  const sizeMm = sideOf(vertices) * UNITS[own];
   if (sizeMm < PLAUSIBLE_MM.least || sizeMm > PLAUSIBLE_MM.most) {
     throw bad(`${name} would measure ${Number(sizeMm.toPrecision(4))} mm if it is in ${own}: give 'unit', also if that is so`);
   }

@@ -83,14 +83,17 @@ test('what is no mesh is named', async () => {
   await assert.rejects(readMesh(text(nan), 'nan.obj'), { message: /not finite/ });
   const many = `v 0 0 0\nv 9 0 0\nv 0 9 0\n${'f 1 2 3\n'.repeat(16385)}`;
   await assert.rejects(readMesh(text(many), 'many.obj'), { message: /16385 triangles; a mesh may have 16384/ });
-  // A strip of 16 384 triangles, whose coordinates have many digits: in mm they have too many bytes, within 9 mm they fit.
-  const strip = (/** @type {number} */ scale) => {
-    const at = (/** @type {number} */ k) => `v ${scale * (k / 8194)} ${scale * (((k % 2) + 1) / 3)} ${scale / 7}\n`;
+  // A strip of 16 384 triangles, whose coordinates have many digits: far from the origin they have too many bytes.
+  const strip = (/** @type {number} */ scale, /** @type {number} */ from = 0) => {
+    const at = (/** @type {number} */ k) => `v ${from + scale * (k / 8194)} ${from + scale * (((k % 2) + 1) / 3)} ${from + scale / 7}\n`;
     const face = (/** @type {number} */ k) => `f ${k + 1} ${k + 2} ${k + 3}\nf ${k + 1} ${k + 3} ${k + 2}\n`;
     return text([...Array.from({ length: 8194 }, (_, k) => at(k)), ...Array.from({ length: 8192 }, (_, k) => face(k))].join(''));
   };
-  await assert.rejects(readMesh(strip(-400), 'strip.obj'), { message: /16384 triangles; a hello has room for 507904/ });
+  await assert.rejects(readMesh(strip(9, -40000), 'strip.obj'), { message: /16384 triangles; a hello has room for 507904/ });
   const { vertices_mm: v, triangles } = await readMesh(strip(9), 'strip.obj');
   assert.equal(triangles.length, 16384);
   assert.ok(v.flat().every((x) => Math.abs(1e4 * x - Math.round(1e4 * x)) < 1e-6));
+  // A body whose unit was said wrongly keeps its shape.
+  const { vertices_mm: small } = await readMesh(strip(0.009), 'strip.obj', { unit: 'mm' });
+  for (const [k, p] of small.entries()) p.forEach((x, axis) => assert.ok(Math.abs(1e3 * x - v[k][axis]) < 6e-4, `${p}`));
 });
