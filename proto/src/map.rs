@@ -2,7 +2,7 @@
 
 use crate::{ErrorCode, Problem, SampleType, effects::OutOfRange};
 
-pub use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
+pub use papilla_atlas::{DOUBTED_BELOW_PA, MAP_LEN, MAP_SIDE_PX};
 
 /// Room above the greatest trained pressure, as a factor.
 ///
@@ -81,10 +81,6 @@ pub const FLAGGED_HEADROOM: f32 = 10.0;
 /// Room above the greatest trained pressure where pressure is clamped, as a factor: far beyond any
 /// finger, and sums over a map stay finite.
 pub const CLAMPED_HEADROOM: f32 = 1e4;
-
-/// Greatest pressure of a map, Pa, below which its unit is in doubt: a map in kPa or MPa that is sent as
-/// one in Pa stays below, and of the contacts that people feel hardly any does.
-pub const DOUBTED_BELOW_PA: f32 = 150.0;
 
 /// What [`PressureRange::check`] learns on its way through the map.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -59,6 +61,10 @@ class Feel:
         """
         sed = _map(sed_j_per_m3, "sed_j_per_m3", "sed")
         pressure = np.zeros_like(sed) if pressure_pa is None else _map(pressure_pa, "pressure_pa", "pressure")
+        return self._step(sed, time_s, pressure)
+
+    def _step(self, sed: Map, time_s: float, pressure: Map) -> Answer:
+        """`step` with maps that were looked at."""
         if not 0.0 <= time_s < 1e9:
             raise BadInput("time_s", f"{time_s} s; times count from 0")
         self._sequence = (self._sequence + 1) % _SEQUENCES
@@ -78,7 +84,8 @@ class Feel:
             self._warned.once("times", doubt)
         for number, one in enumerate(maps):
             _check_finite(one, "sed_j_per_m3", number)
-        under: list[Any] = [None] * len(maps)
+        nothing = np.zeros(check.SIDE, np.float32)
+        under: Iterable[NDArray[Any]] = itertools.repeat(nothing, len(maps))
         if pressure_pa is not None:
             pressures, said = check.given(pressure_pa, "pressure_pa", "pressure")
             if not said:
@@ -87,9 +94,9 @@ class Feel:
                 _check_finite(one, "pressure_pa", number)
             if pressures.shape != maps.shape:
                 raise BadInput("pressure_pa", f"shape {pressures.shape}; that of the maps of SED, {maps.shape}, is due")
-            under = list(pressures)
+            under = pressures
         each = zip(maps, times, under, strict=True)
-        return [self.step(one, float(time), pressure_pa=pressure) for one, time, pressure in each]
+        return [self._step(_plain(one), float(time), _plain(pressure)) for one, time, pressure in each]
 
 
 def _map(values: ArrayLike, member: str, kind: str) -> Map:
@@ -97,6 +104,10 @@ def _map(values: ArrayLike, member: str, kind: str) -> Map:
     if array.shape != check.SIDE:
         raise BadInput(member, f"shape {array.shape}; ({SIDE_PX}, {SIDE_PX}) is due")
     _check_finite(array, member, None)
+    return _plain(array)
+
+
+def _plain(array: NDArray[Any]) -> Map:
     return np.ascontiguousarray(array, np.float32)
 
 

@@ -67,6 +67,11 @@ pub const MAP_SIDE_PX: usize = 224;
 /// Number of samples of a map.
 pub const MAP_LEN: usize = MAP_SIDE_PX * MAP_SIDE_PX;
 
+/// Greatest pressure of a map, Pa, below which its unit is in doubt: a map in kPa or MPa that is given as
+/// one in Pa stays below, and of the contacts that people feel hardly any does. Clients ask about the
+/// same.
+pub const DOUBTED_BELOW_PA: f32 = 150.0;
+
 /// Version of the atlas file format that this code reads and writes.
 pub const ATLAS_VERSION: u32 = 1;
 

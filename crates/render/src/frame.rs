@@ -229,6 +229,7 @@ pub fn lose(
     effects: Option<&mut Effects>,
 ) -> (MapSummary, u8) {
     maps.pressure_pa.fill(0.0);
+    maps.sent = None;
     if let Some(finger) = finger {
         finger.lose();
     }

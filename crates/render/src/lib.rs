@@ -269,6 +269,10 @@ mod tests {
             let summary = maps.check(range, &skin)?;
             let found = maps.judge(summary, range, &skin, knows.then_some(all)).flags;
             assert_eq!(found, due, "{peak_pa} Pa");
+            // Of a frame without tracking nothing of the last one is told.
+            let (summary, _) = lose(&mut maps, None, None);
+            let found = maps.judge(summary, range, &skin, knows.then_some(all)).flags;
+            assert_eq!(found, flags::NO_CONTACT, "after {peak_pa} Pa");
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use super::error::require;
 use super::{Motion, Scene, SceneError};
 use ndarray_npy::{NpzReader, ReadNpyError, ReadNpyExt as _};
-use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
+use papilla_atlas::{DOUBTED_BELOW_PA, MAP_LEN, MAP_SIDE_PX};
 use papilla_sdf::IndenterSpec;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,8 +52,6 @@ fn one() -> usize {
 const INCREMENTS_MAX: usize = 1000;
 /// Beyond it a pressure in Pa must have been meant in another unit.
 const PRESSURE_MAX_PA: f32 = 1e7;
-/// Below it kPa or MPa may have been given for Pa; the Python client asks about the same.
-const PRESSURE_ASKED_PA: f32 = 150.0;
 /// Largest file that is read.
 const FILE_BYTES_MAX: u64 = 1 << 30;
 
@@ -156,7 +154,7 @@ impl Pressure {
     #[must_use]
     pub(crate) fn tiny_pa(map: &[f32]) -> Option<f32> {
         let most = map.iter().copied().fold(0.0, f32::max);
-        (most < PRESSURE_ASKED_PA).then_some(most)
+        (most < DOUBTED_BELOW_PA).then_some(most)
     }
 
     fn read(&self, path: &Path) -> Result<Vec<f32>, SceneError> {
