@@ -18,7 +18,7 @@ INTRODUCTION = """# Tests: when each part last ran
 `./test --record` writes this page, also together with `--fast` or `--all`. It notes each part that
 it ran, and leaves all other rows as they are. A row tells how the part ended at the named commit.
 If it failed there, it may work again by now: the messages of `git log docs/reports/tests.md` may
-say so. What the parts do that never ran is listed by `./test --all --list`.
+say so. `./test --all --list` says what the parts do that never ran.
 [Testing](../guides/testing.md) explains the options. Processor seconds count all processes of a
 part.
 
