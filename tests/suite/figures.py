@@ -22,7 +22,8 @@ frame.NAME.METHOD.SET.ms is a warm frame from poses: the network and the contact
 sessions.NAME.maps and sessions.NAME.poses are the sessions of 90 Hz that one core holds at half
 load, from the two times above (docs/guides/operating.md).
 
-Errors are rounded to what they are worth: one decimal below 10 %, none above.
+Errors are rounded to what they are worth: one decimal below 10 %, none above. KEY.exact has two decimals.
+KEY?AIM is `met` if the figure is at most AIM, which has the figure's unit, and `**missed**` if not.
 """
 
 import json
@@ -32,7 +33,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-MARK = re.compile(r"(<!-- =([\w.-]+) -->)([^<]*)(<!-- / -->)")
+MARK = re.compile(r"(<!-- =([\w.-]+)(?:\?([\d.]+))? -->)([^<]*)(<!-- / -->)")
 SETS = {
     "reference": "reference",
     "reference-anew": "reference-anew",
@@ -59,17 +60,41 @@ QUANTITIES = {"pressure": "pressure_relative_l2", "force": "force_relative", "se
 CONTACT_SETS = {"final": "reference", "broad": "broad", "heldout": "unseen"}
 
 
-def percent(value: float) -> str:
+class Figure(str):
+    """A figure as a page shows it, which knows what it was rounded from, in the unit that is shown."""
+
+    exact: float
+
+    def __new__(cls, text: str, exact: float):
+        made = super().__new__(cls, text)
+        made.exact = exact
+        return made
+
+
+def percent(value: float) -> Figure:
     """An error in percent, rounded to what it is worth."""
-    return f"{100 * value:.1f} %" if 100 * value < 9.95 else f"{100 * value:.0f} %"
+    shown = 100 * value
+    return Figure(f"{shown:.1f} %" if shown < 9.95 else f"{shown:.0f} %", shown)
 
 
-def milliseconds(value: float) -> str:
+def milliseconds(value: float) -> Figure:
     """A time, to two figures."""
-    return f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
+    return Figure(f"{value:.1f}" if value < 9.95 else f"{value:.0f}", value)
 
 
-def of_ladder(text: str) -> dict[str, str]:
+def asked(key: str, aim: str | None, known: dict[str, Figure]) -> str | None:
+    """What stands at a mark: the figure, its exact form, or whether it reaches the aim; none without a source."""
+    figure = known.get(key.removesuffix(".exact"))
+    if figure is None:
+        return None
+    if aim is not None:
+        return "met" if figure.exact <= float(aim) else "**missed**"
+    if key.endswith(".exact"):
+        return f"{figure.exact:.2f} %" if figure.endswith("%") else f"{figure.exact:.2f}"
+    return figure
+
+
+def of_ladder(text: str) -> dict[str, Figure]:
     """Figures of the ladder."""
     found = {}
     for rung in json.loads(text)["rungs"]:
@@ -82,11 +107,11 @@ def of_ladder(text: str) -> dict[str, str]:
         if latency := (rung["latency_ms"] or {}).get("tract"):
             found[f"{rung['name']}.ms"] = milliseconds(latency["p50"])
         if seconds := rung["seconds"]:
-            found[f"{rung['name']}.s"] = f"{seconds['p50']:.0f}"
+            found[f"{rung['name']}.s"] = Figure(f"{seconds['p50']:.0f}", seconds["p50"])
     return found | of_truth(json.loads(text))
 
 
-def of_truth(ladder: dict) -> dict[str, str]:
+def of_truth(ladder: dict) -> dict[str, Figure]:
     """What the truths err themselves: the reference's SED, and the teacher's pressure against it."""
     pressure = ladder["readings"]["pressure"]
     return {
@@ -96,7 +121,7 @@ def of_truth(ladder: dict) -> dict[str, str]:
     }
 
 
-def of_contact(text: str) -> dict[str, str]:
+def of_contact(text: str) -> dict[str, Figure]:
     """Figures of the contact report."""
     found = {}
     for line in text.splitlines():
@@ -106,12 +131,12 @@ def of_contact(text: str) -> dict[str, str]:
         key = f"contact.{METHODS[cells[0]]}.{CONTACT_SETS[cells[1]]}"
         for quantity, cell in [("pressure", 2), ("force", 3), ("sed", 4), ("us", 6)]:
             median, p95 = (float(part) for part in cells[cell].split("/"))
-            show = (lambda us: f"{us:.0f}") if quantity == "us" else (lambda error: percent(error / 100))
+            show = (lambda us: Figure(f"{us:.0f}", us)) if quantity == "us" else (lambda error: percent(error / 100))
             found[f"{key}.{quantity}"], found[f"{key}.{quantity}.p95"] = show(median), show(p95)
     return found
 
 
-def differing(model: str, known: dict[str, str]) -> list[str]:
+def differing(model: str, known: dict[str, Figure]) -> list[str]:
     """Where models/contact.json, which the service answers from, is not what the report says."""
     faults = []
     for method in json.loads(model)["methods"]:
@@ -127,7 +152,7 @@ def differing(model: str, known: dict[str, str]) -> list[str]:
     return faults
 
 
-def of_sizing(text: str, contact_us: float) -> dict[str, str]:
+def of_sizing(text: str, contact_us: float) -> dict[str, Figure]:
     """Sessions that one core holds, by what a frame takes of it."""
     found = {}
     for rung in json.loads(text)["rungs"]:
@@ -138,7 +163,7 @@ def of_sizing(text: str, contact_us: float) -> dict[str, str]:
     return found
 
 
-def of_frames(text: str, contact: dict[str, str]) -> dict[str, str]:
+def of_frames(text: str, contact: dict[str, Figure]) -> dict[str, Figure]:
     """Times of frames from poses: contact, then a network."""
     found = {}
     for rung in json.loads(text)["rungs"]:
@@ -151,7 +176,7 @@ def of_frames(text: str, contact: dict[str, str]) -> dict[str, str]:
     return found
 
 
-def figures() -> dict[str, str]:
+def figures() -> dict[str, Figure]:
     """All figures, by key."""
     ladder = (ROOT / "models/ladder.json").read_text()
     contact = of_contact((ROOT / "docs/reports/contact.md").read_text())
@@ -159,18 +184,18 @@ def figures() -> dict[str, str]:
     return of_ladder(ladder) | contact | sizing | of_frames(ladder, contact)
 
 
-def filled(text: str, known: dict[str, str]) -> tuple[str, list[str]]:
+def filled(text: str, known: dict[str, Figure]) -> tuple[str, list[str]]:
     """The text with its figures renewed, and a line for each that was stale or has no source."""
     wrong = []
 
     def renew(mark: re.Match[str]) -> str:
-        value = known.get(mark[2])
+        value = asked(mark[2], mark[3], known)
         if value is None:
             wrong.append(f"no source has '{mark[2]}' (--list)")
             return mark[0]
-        if value != mark[3]:
-            wrong.append(f"{mark[2]} is {value}, the page says {mark[3] or 'nothing'}")
-        return mark[1] + value + mark[4]
+        if value != mark[4]:
+            wrong.append(f"{mark[2]} is {value}, the page says {mark[4] or 'nothing'}")
+        return mark[1] + value + mark[5]
 
     return MARK.sub(renew, text), wrong
 
