@@ -25,7 +25,7 @@ question: the stress at which they begin to fire was not fitted to people.
 **Method.** The first table repeats TouchSim's own tests (`tests/test_timing.py` of github.com/hsaal/touchsim): the first
 neuron of each class under a pin that moves for a second. TouchSim's tests allow a difference of one spike, and of 0.25
 ms in the time of the first spike; *ok* means that this holds here too. SA1 are slowly adapting, RA rapidly adapting and
-PC Pacinian fibres. The command writes this page:
+PC Pacinian fibres. *Neuron* and *unit* both stand for one simulated fibre. The command writes this page:
 
 ```sh
 cargo run --release -p papilla-studies -- spikes

@@ -87,7 +87,7 @@ fn readings(text: &mut String, found: &Readings) {
          maps of the same state. The table compares the two pressure maps, and each network's two answers.\n\
          A network can only know the map that it is given. Suppose that its answer to one of the two maps is exactly right.\n\
          Then its answer to the other map is wrong by about the difference between the two answers. Training could lessen only\n\
-         what is systematic in this difference, which was not tried. Smoothing takes away half of the difference of the\n\
+         the systematic part of this difference; this was not tried. Smoothing takes away half of the difference of the\n\
          pressure maps: so half of it is in detail finer than some 0.1 mm.\n\n\
          | relative L2 between the two | median | p95 |\n|---|---|---|\n",
         found.states, found.mesh
@@ -121,7 +121,7 @@ fn costs(text: &mut String, ladder: &Ladder) {
         text.push(')');
     }
     text.push_str(
-        ".\n\nThe first times are those of the service's backend, whose name is *tract*, also in the JSON files. It evaluates the\n\
+        ".\n\nThe first two columns of times are of the service's backend. The JSON files call it *tract*. It evaluates the\n\
          networks of the service by rows, in code of its own; the library tract itself runs both U-Nets and `half-space`.\n\n\
          | way | kind | as the service runs it: p50, ms | p99 | ONNX Runtime p50, ms | p99 | time to load, ms | memory, MiB | file, kB |\n\
          |---|---|---|---|---|---|---|---|---|\n",

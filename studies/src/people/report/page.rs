@@ -43,9 +43,9 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "{}Computed on {}. {}. The mesh of the spheres is `{}`, and that of the plates `coarse`. \
-             Both are \
-             [graded](../../docs/reference/scenes.md#geometry), unless the table above names the even mesh.\n\n## Rows\n\n| quantity | the model | measured | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
+            "{}Computed on {}. {}. The meshes are [graded](../../docs/reference/scenes.md#geometry), \
+             unless the table above names the even mesh. Their density is `{}` under the spheres and \
+             `coarse` under the plates.\n\n## Rows\n\n| quantity | the model | measured | kind of spread | source | verdict | what would bring the model nearer |\n|---|---|---|---|---|---|---|\n",
             HEAD.replace("DENSITY", density(self.density)),
             self.made,
             self.finger_text(),

@@ -62,8 +62,8 @@ impl Count {
     fn lists(&self) -> [(&'static str, &[(usize, String)]); 3] {
         [
             ("converged, a balance missed", &self.unbalanced),
-            ("refused with a typed error", &self.refused),
-            ("panicked", &self.panicked),
+            ("refused with an error that names the cause", &self.refused),
+            ("crashed", &self.panicked),
         ]
     }
 
@@ -94,7 +94,7 @@ impl ScenesReport {
     pub fn markdown(&self) -> String {
         let Self { of, scenes, now, counted, first_run, .. } = self;
         let mut out = format!(
-            "# Random scenes\n\n\
+            "# Random scenes, {} mesh\n\n\
              **Question.** Does every random scene converge and balance ([method and \
              command](stability.md#random-scenes))?\nThe [glossary](../glossary.md) explains terms. \
              This page has the scenes of the campaign {of} (`--scenes {scenes} --seed {}`).\n\n\
@@ -102,7 +102,10 @@ impl ScenesReport {
              improve the solver |\n\
              |---|---|---|\n| scenes | {scenes} | {counted} |\n\
              | converged, every balance kept | {} | {} |\n",
-            of.seed, now.balanced, first_run.balanced
+            format!("{:?}", of.density).to_lowercase(),
+            of.seed,
+            now.balanced,
+            first_run.balanced
         );
         for ((what, now), (_, first)) in now.lists().into_iter().zip(first_run.lists()) {
             let _ = writeln!(out, "| {what} | {} | {} |", now.len(), first.len());
@@ -111,7 +114,7 @@ impl ScenesReport {
         let _ = write!(
             out,
             "\nThe last runs {verdict} the criterion: 99.9 % converge, each of these balances, and nothing \
-             panics. Of all scenes\nthat are drawn in this way, at most **{:.3} %** fail in their first \
+             crashes. Of all scenes\nthat are drawn in this way, at most **{:.3} %** fail in their first \
              run, at 95 % confidence (bound of Clopper and\nPearson for a count of {} among {counted}, which takes the \
              scenes for independent).\n",
             100.0 * self.failing_at_most,
@@ -128,9 +131,9 @@ impl ScenesReport {
             0 => writeln!(out, "\nHow often a scene was solved anew was not recorded."),
             recorded => writeln!(
                 out,
-                "\nA scene that misses a balance is solved anew, on a finer path or with another contact \
-                 rule. {recorded} of {scenes}\nrecords say whether this was so: {} scenes were solved \
-                 more than once.",
+                "\nA scene that misses a balance is solved anew, with more steps on the path or with another contact \
+                 rule.\nHow often a scene was solved is recorded for {recorded} of {scenes} scenes: {} of them were \
+                 solved more than once.",
                 self.retried
             ),
         };
