@@ -1,4 +1,4 @@
-"""A pressure of your own: what finite elements and a network say of it, and which fibres fire.
+"""A pressure that a sensor read: what finite elements and a network say of it, and which fibres fire.
 
 Needs Papilla's wheel, and no service. Writes felt.npz, spikes.npz and own_pressure.png (matplotlib).
 """
@@ -7,12 +7,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import papilla
-from papilla import afferents, fe
+from papilla import afferents, fe, sensors
 
-# In place of a map that a sensor measured: two bumps under the pad.
-atlas = papilla.Finger().atlas()
+# In place of readings of your own: those of a virtual array of 13 x 12 taxels, under two bumps.
+array = sensors.Taxels.grid(13, 12, pitch_mm=1.0, unit="kPa", url="local")
 bumps = [papilla.Contact(at_mm=(11.25, y_mm, -6.5), force_n=0.05) for y_mm in (-1.5, 1.5)]
-pressure_pa = atlas.contacts(bumps)
+readings = np.nan_to_num(array.read(array.atlas.contacts(bumps)))
+# A map of 224 x 224 that reproduces the readings.
+pressure_pa = array.pressure(readings)
 
 # A coarse mesh, to be quick; leave density and order out for one on which SED is good.
 scene = {"geometry": {"kind": "fingertip", "density": "coarse", "order": "linear"}, "pressure": {"increments": 1}}
