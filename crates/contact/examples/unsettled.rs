@@ -10,7 +10,7 @@
 
 mod poses;
 
-use papilla_contact::{Contact, PixelContact, PixelSpacing, Quality, Settings, Solver};
+use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Quality, Settings, Solver};
 use poses::{DEPTH_MM, Pad, shapes};
 use std::error::Error;
 use std::path::Path;
@@ -24,19 +24,25 @@ struct Asked {
     poses: usize,
     seed: u64,
     spacing: PixelSpacing,
+    /// Coefficient of friction of all objects.
+    friction: f64,
 }
 
 impl Asked {
     fn read() -> Result<Self, Box<dyn Error>> {
-        let mut asked = Self { poses: 500, seed: 20, spacing: PixelSpacing::One };
+        let mut asked = Self { poses: 500, seed: 20, spacing: PixelSpacing::One, friction: 0.0 };
         let mut words = std::env::args().skip(1);
         while let Some(word) = words.next() {
             let mut number = || words.next().ok_or(format!("{word} needs a number"));
             match word.as_str() {
                 "--poses" => asked.poses = number()?.parse()?,
                 "--seed" => asked.seed = number()?.parse()?,
+                "--friction" => asked.friction = number()?.parse()?,
                 "--coarse" => asked.spacing = PixelSpacing::Two,
-                _ => return Err(format!("{word}: use --poses N, --seed N, --coarse").into()),
+                _ => {
+                    let known = "--poses N, --seed N, --friction COEFFICIENT, --coarse";
+                    return Err(format!("{word}: use {known}").into());
+                }
             }
         }
         Ok(asked)
@@ -70,9 +76,10 @@ impl Count {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let Asked { poses, seed, spacing } = Asked::read()?;
+    let Asked { poses, seed, spacing, friction } = Asked::read()?;
     let (pad, shapes) = (Pad::of(Path::new(MODELS))?, shapes());
-    let mut solver = Solver::new(Arc::clone(&pad.model), Settings::default())?;
+    let settings = Settings { friction: friction > 0.0, ..Settings::default() };
+    let mut solver = Solver::new(Arc::clone(&pad.model), settings)?;
     let mut pixels = PixelContact::new(Arc::clone(&pad.skin), &pad.model, spacing);
     let mut out = Contact::new(pad.model.vertices());
     let mut random = fastrand::Rng::with_seed(seed);
@@ -85,7 +92,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             objects.clear();
             for _ in 0..1 + usize::from(random.u8(..8) == 0) {
                 which = random.usize(..shapes.len());
-                objects.push(pad.throw(&mut random, &shapes[which]));
+                let object = pad.throw(&mut random, &shapes[which]);
+                objects.push(Object { friction, ..object });
             }
         } else {
             objects[0].placement.origin_mm[2] += 0.1 * (random.f64() - 0.5);
@@ -121,7 +129,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}\n", held.told("of these, with a held body"));
     units.sort_by(f64::total_cmp);
     let at = |q: f64| units.get(((units.len().max(1) - 1) as f64 * q) as usize);
-    let [median, most] = [0.5, 0.99].map(|q| at(q).copied().unwrap_or(0.0));
-    println!("million units of work: median {median:.1}, 99th percentile {most:.0}");
+    let [median, bad, most] = [0.5, 0.95, 0.99].map(|q| at(q).copied().unwrap_or(0.0));
+    println!(
+        "million units of work: median {median:.1}, 95th percentile {bad:.0}, 99th percentile {most:.0}, in \
+         all {:.0}",
+        units.iter().sum::<f64>()
+    );
     Ok(())
 }
