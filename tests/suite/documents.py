@@ -9,7 +9,7 @@ links. Reports (docs/reports, studies/reports) are written by commands: of them 
 looked at. No text of a plot (an .svg of docs or studies) is cut off by the picture's edge. The
 number of words has no limit; --words prints each file's. A word is anything between blanks that
 holds a letter; tables count, fenced code, comments and the targets of links do not.
-No line is left over from a merge. Exit code 1 if a rule is broken.
+No line is left over from a merge. A page that shows SED says in which finger. Exit code 1 if a rule is broken.
 """
 
 import re
@@ -31,6 +31,8 @@ LINK = re.compile(r"\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*
 LETTER = 0.5
 # Marks of a merge, also shortened ones. A heading is never underlined here.
 MERGE = re.compile(r"(<{3,}|={3,}|>{3,}|\|{7})( |$)")
+# A page that shows SED: as often as this it names it, and gives a figure.
+FIGURES_MIN = 5
 OUTSIDE = re.compile(r"^[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 
 
@@ -102,6 +104,13 @@ def merge_lines(text: str) -> Iterator[str]:
             yield f"{number}: left over from a merge: {line}"
 
 
+def unnamed_finger(text: str) -> Iterator[str]:
+    """A page with figures of SED says in which finger; a reader may take it for a person's."""
+    figures = len(re.findall(r"\d (?:%|J/m3)", text))
+    if min(len(re.findall(r"\bSED\b", text)), figures) >= FIGURES_MIN and not re.search(r"default\s+finger", text):
+        yield "1: shows SED, and does not say in which finger: name the default finger, or another one"
+
+
 def words(text: str) -> int:
     """Words outside of fenced code, comments and the targets of links."""
     shown = "\n".join(line for _, line in prose(text))
@@ -134,7 +143,7 @@ def main() -> int:
         text = path.read_text()
         if HEADS.match(name):
             continue
-        rules = [*broken_links(path, text), *merge_lines(text)]
+        rules = [*broken_links(path, text), *merge_lines(text), *unnamed_finger(text)]
         if not GENERATED.match(name):
             rules += long_lines(text)
             counts[name] = words(text)

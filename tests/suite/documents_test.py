@@ -31,6 +31,14 @@ class Links(unittest.TestCase):
         self.assertEqual(self.faults("`[a](gone.md)`\n\n```text\n[b](gone.md)\n```\n"), [])
 
 
+class Fingers(unittest.TestCase):
+    def test_a_page_with_figures_of_sed_says_in_which_finger(self) -> None:
+        shows = "The SED was 8 % off.\n" * 5
+        self.assertEqual(len(list(documents.unnamed_finger(shows))), 1)
+        self.assertEqual(list(documents.unnamed_finger(shows + "It is of the default\nfinger.\n")), [])
+        self.assertEqual(list(documents.unnamed_finger("SED is strain energy density.\n" * 9)), [])
+
+
 class Lines(unittest.TestCase):
     def test_prose_is_measured_tables_code_and_addresses_are_not(self) -> None:
         long = "x" * (documents.LINE_MAX + 1)
