@@ -17,6 +17,7 @@ from . import answer as answers
 from . import check, wire
 from .address import Address, clean_token
 from .answer import Answer, Problem
+from .calls import Sends
 from .errors import BadInput, Closed, Refused, Unreachable
 from .http import DEFAULT_URL, LOCAL, refusal, without_service
 from .link import Frame, StaysError, Warned, dial, questions, told_beyond, told_refused, told_stays
@@ -29,7 +30,7 @@ TIMEOUT_S: Final = 5.0
 """After so long a frame without an answer is `lost`."""
 
 
-class AsyncSession:
+class AsyncSession(Sends):
     """A session: pressure maps in, SED maps out, the latest frame wins.
 
     `async with AsyncSession() as session: (await session.render(pressure_pa)).sed`
@@ -177,20 +178,10 @@ class AsyncSession:
         message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us)
         return Frame(self._sequence, time_us, message)
 
-    def send_poses(
-        self,
-        poses: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
+    def _hand_over(
+        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
     ) -> Future[Answer]:
-        """Hands over where the objects of the hello are, and returns at once.
-
-        `poses` has a row of seven for each: its origin in the finger's frame, mm, and its turn as a
-        unit quaternion x y z w. `net` is a net force to be met: a unit vector and N.
-        """
-        frame = self.encode_rows("objects", poses, finger, net, client_time_us)
+        frame = self.encode_rows(kind, values, finger, net, client_time_us)
         self.hand_over(frame)
         return frame.outcome
 
@@ -213,22 +204,6 @@ class AsyncSession:
         if poses is None:
             return await self.not_tracked(finger=finger)
         return await asyncio.wrap_future(self.send_poses(poses, finger=finger, net=net))
-
-    def send_gaps(
-        self,
-        depth_mm: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
-    ) -> Future[Answer]:
-        """Hands over how deep the undeformed skin lies in things, mm; negative in air.
-
-        With `velocity` in the hello, x y z mm/s of each vertex follow the depths.
-        """
-        frame = self.encode_rows("gaps", depth_mm, finger, net, client_time_us)
-        self.hand_over(frame)
-        return frame.outcome
 
     def encode_rows(
         self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None = None

@@ -1,4 +1,4 @@
-"""What can be called on a session without asyncio, whether it has a service or is in process."""
+"""What can be called on a session, whether it has a service or is in process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,46 @@ if TYPE_CHECKING:
     from .series import Series
 
 
-class Calls(ABC):
+class Sends(ABC):
+    """Calls that hand over rows of the hello's `input`, with or without asyncio."""
+
+    @abstractmethod
+    def _hand_over(
+        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
+    ) -> Future[Answer]:
+        """Hands over rows of the hello's `input`: `objects` or `gaps`."""
+
+    def send_poses(
+        self,
+        poses: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
+        """Hands over where the objects of the hello are, and returns at once.
+
+        `poses` has a row of seven for each: its origin in the finger's frame, mm, and its turn as a
+        unit quaternion x y z w. `net` is a net force to be met: a unit vector and N.
+        """
+        return self._hand_over("objects", poses, finger, net, client_time_us)
+
+    def send_gaps(
+        self,
+        depth_mm: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
+        """Hands over how deep the undeformed skin lies in things, mm; negative in air.
+
+        With `velocity` in the hello, x y z mm/s of each vertex follow the depths.
+        """
+        return self._hand_over("gaps", depth_mm, finger, net, client_time_us)
+
+
+class Calls(Sends):
     """Calls that wait, on top of those that hand over."""
 
     timeout_s: float
@@ -44,34 +83,6 @@ class Calls(ABC):
         client_time_us: int | None = None,
         deadline_us: int = 0,
     ) -> Future[Answer]: ...
-
-    @abstractmethod
-    def _hand_over(
-        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
-    ) -> Future[Answer]:
-        """Hands over rows of the hello's `input`: `objects` or `gaps`."""
-
-    def send_poses(
-        self,
-        poses: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
-    ) -> Future[Answer]:
-        """Hands over where objects are; see `AsyncSession.send_poses`."""
-        return self._hand_over("objects", poses, finger, net, client_time_us)
-
-    def send_gaps(
-        self,
-        depth_mm: ArrayLike,
-        *,
-        finger: int = 0,
-        net: NetForce | None = None,
-        client_time_us: int | None = None,
-    ) -> Future[Answer]:
-        """Hands over gaps; see `AsyncSession.send_gaps`."""
-        return self._hand_over("gaps", depth_mm, finger, net, client_time_us)
 
     @abstractmethod
     def unit_is_known(self) -> None: ...
