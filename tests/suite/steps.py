@@ -125,6 +125,13 @@ def fast() -> list[Step]:
             tests_min=17,
         ),
         Step(
+            "examples",
+            "the examples of the Rust libraries run, and print what is known of their answers",
+            "tests/examples/run",
+            after=("build",),
+            tests_min=8,
+        ),
+        Step(
             "data",
             "the committed datasets and models are whole",
             'for m in data/*/manifest.json; do "$BIN/fe-datagen" dataset verify "$(dirname "$m")"; done\n'
