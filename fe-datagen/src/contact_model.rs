@@ -11,6 +11,7 @@ use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::{Finger, TissueTable};
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::tissue::Tissue;
+use papilla_vector::norm;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -175,7 +176,7 @@ impl Presses {
     fn loads(&self, compliance: &Compliance) -> Vec<Load> {
         let mut loads = Vec::new();
         for Pressed { force_n, pressure_pa } in &self.states {
-            let size = force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+            let size = norm(*force_n);
             let areas_mm2 = &compliance.area_mm2;
             let weights = pressure_pa.iter().zip(areas_mm2).map(|(p, a)| f64::from(p * a));
             let total: f64 = weights.clone().sum();

@@ -3,6 +3,7 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
+use papilla_atlas::PA_PER_MPA;
 use papilla_atlas::Patch;
 use papilla_contact::{Arrays, Contact, ContactModel, Header, Method, Object, Settings, Solver};
 use papilla_fem::solve::Options;
@@ -11,7 +12,6 @@ use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::{Scene, TissueTable};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::drive::DrivePoint;
-use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
 use papilla_sdf::{Placement, SignedDistance};
 use std::path::Path;

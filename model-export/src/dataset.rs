@@ -3,7 +3,7 @@
 
 use crate::ExportError;
 use crate::metrics::Ground;
-use crate::part::Part;
+use crate::split::SplitOrAll;
 use papilla_dataset::{Field, IndentationEntry, Maps, Shard};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::scene::Finger;
@@ -172,22 +172,22 @@ impl Dataset {
         &self.files.manifest().effects
     }
 
-    /// The indentations of a part, by rising id.
+    /// The indentations of a split, by rising id.
     ///
     /// # Errors
-    /// [`ExportError::EmptyPart`] if there are none.
+    /// [`ExportError::EmptySplit`] if there are none.
     pub fn indentations(
         &self,
-        part: impl Into<Part>,
+        split: impl Into<SplitOrAll>,
     ) -> Result<Vec<&IndentationEntry>, ExportError> {
-        let part = part.into();
-        let found: Vec<_> = match part {
-            Part::Split(split) => self.files.of_split(split).collect(),
-            Part::All => self.every_indentation(),
+        let split = split.into();
+        let found: Vec<_> = match split {
+            SplitOrAll::Split(split) => self.files.of_split(split).collect(),
+            SplitOrAll::All => self.every_indentation(),
         };
         if found.iter().all(|indentation| indentation.samples == 0) {
             let path = self.folder().join("manifest.json");
-            return Err(ExportError::EmptyPart { path, part });
+            return Err(ExportError::EmptySplit { path, split });
         }
         Ok(found)
     }

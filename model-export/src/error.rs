@@ -1,6 +1,6 @@
 //! What can go wrong when a model is checked, evaluated or described.
 
-use crate::part::Part;
+use crate::split::SplitOrAll;
 use papilla_dataset::DatasetError;
 use papilla_engine::EngineError;
 use papilla_output::OutputError;
@@ -109,13 +109,13 @@ pub enum ExportError {
         /// What was allowed.
         tolerance: f64,
     },
-    /// A part without samples.
-    #[error("{path}: '{part}' holds no sample")]
-    EmptyPart {
+    /// A split without samples.
+    #[error("{path}: '{split}' holds no sample")]
+    EmptySplit {
         /// The manifest.
         path: PathBuf,
-        /// The part.
-        part: Part,
+        /// The split.
+        split: SplitOrAll,
     },
     /// A truth without energy, or with what is no energy density.
     #[error("{path}: sample {sample} has no usable SED: {reason}")]
@@ -141,7 +141,7 @@ pub enum ExportError {
         /// The picture.
         path: PathBuf,
         /// The encoder's words.
-        source: image::ImageError,
+        source: OutputError,
     },
 }
 

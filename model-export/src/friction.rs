@@ -12,6 +12,7 @@ use papilla_contact::{
 use papilla_dataset::{IndentationEntry, Shard};
 use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::{Patch, VertexSampler};
+use papilla_vector::norm;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -136,7 +137,7 @@ impl<'a> Rubbing<'a> {
     /// Frames from one depth and slide to the next, mm.
     fn go(&mut self, placed: &Placed, from: [f64; 3], to: [f64; 3]) {
         let way = [0, 1, 2].map(|i| to[i] - from[i]);
-        let steps = (size(way) / STEP_MM).ceil().max(1.0);
+        let steps = (norm(way) / STEP_MM).ceil().max(1.0);
         for step in 1..=steps as usize {
             let [depth, x, y] = [0, 1, 2].map(|i| from[i] + step as f64 / steps * way[i]);
             let object = Object { friction: self.friction, ..placed.at(depth, [x, y]) };
@@ -171,9 +172,9 @@ impl<'a> Rubbing<'a> {
         self.pressure.extend(relative_l2(&pressure_pa, &truth));
         let due = [0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]]));
         let off = [0, 1, 2].map(|i| self.out.force_n[i] - due[i]);
-        self.force.push(size(off) / size(due));
+        self.force.push(norm(off) / norm(due));
         let along = (0..3).map(|i| due[i] * way_in[i]).sum::<f64>().abs();
-        self.pull.push(size(across(off, way_in)) / (self.friction * along));
+        self.pull.push(norm(across(off, way_in)) / (self.friction * along));
         let due =
             traction(self.dataset, indentation, shard, state, &self.sampler)?.ok_or_else(|| {
                 let reason = "it holds no shear_pa: solve it with friction".to_owned();
@@ -209,10 +210,6 @@ impl<'a> Rubbing<'a> {
             sed: self.sed.each_ref().map(|sed| both(sed)),
         }
     }
-}
-
-fn size(v: [f64; 3]) -> f64 {
-    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 /// The part of a vector across a unit vector.

@@ -31,11 +31,10 @@ pub mod evaluate;
 pub mod friction;
 pub mod ladder;
 pub mod metrics;
-pub mod part;
 pub mod picture;
-mod processor;
 pub mod reference;
 pub mod shear;
+pub mod split;
 pub mod table;
 
 pub use error::{ExportError, read, read_atlas, read_text, write};

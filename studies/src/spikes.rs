@@ -6,7 +6,7 @@ use papilla_afferents::{
     place,
     touchsim::{FIRST_TOLERANCE_MS, Motion, PUBLISHED, Published, SPIKES_TOLERANCE},
 };
-use papilla_progress::processor::today_here;
+use papilla_processor::today_here;
 use std::fmt::Write as _;
 use std::time::Instant;
 

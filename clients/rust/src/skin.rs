@@ -4,6 +4,7 @@ use papilla_proto::{
     MAP_LEN,
     atlas::{Atlas, AtlasError, Patch, Raster},
 };
+use papilla_vector::{cross, minus, norm};
 
 /// Distance from the skin beyond which a contact adds nothing, mm.
 const REACH_MM: f64 = 5.0;
@@ -132,7 +133,5 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn doubled_area([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    let (p, q) = ([0, 1, 2].map(|i| b[i] - a[i]), [0, 1, 2].map(|i| c[i] - a[i]));
-    let normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
-    normal.iter().map(|n| n * n).sum::<f64>().sqrt()
+    norm(cross(minus(b, a), minus(c, a)))
 }

@@ -6,6 +6,7 @@
 
 use super::{Atlas, Patch};
 use crate::MAP_SIDE_PX;
+use papilla_vector::{cross, minus, norm};
 use serde_json::{Value, json};
 
 const FLOAT: u32 = 5126;
@@ -135,16 +136,13 @@ fn normals(atlas: &Atlas, patch: Patch) -> Vec<[f32; 3]> {
     let mut sums = vec![[0.0_f64; 3]; positions_mm.len()];
     for corners in atlas.triangles() {
         let [a, b, c] = corners.map(|vertex| positions_mm[vertex as usize].map(f64::from));
-        let side = |p: [f64; 3]| [0, 1, 2].map(|axis| p[axis] - a[axis]);
-        let (p, q) = (side(b), side(c));
-        let normal =
-            [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+        let normal = cross(minus(b, a), minus(c, a));
         for vertex in corners {
             (0..3).for_each(|axis| sums[*vertex as usize][axis] += normal[axis]);
         }
     }
     let unit = |sum: [f64; 3]| {
-        let length = sum.iter().map(|s| s * s).sum::<f64>().sqrt();
+        let length = norm(sum);
         // An atlas has no empty triangle; a vertex without one gets some direction.
         if length > 0.0 { sum.map(|s| (s / length) as f32) } else { [0.0, 0.0, -1.0] }
     };

@@ -72,6 +72,9 @@ pub const MAP_LEN: usize = MAP_SIDE_PX * MAP_SIDE_PX;
 /// same.
 pub const DOUBTED_BELOW_PA: f32 = 150.0;
 
+/// Pa per MPa, and J/m3 per mJ/mm3: maps are told in Pa and J/m3, mechanics is solved in N and mm.
+pub const PA_PER_MPA: f64 = 1e6;
+
 /// Version of the atlas file format that this code reads and writes.
 pub const ATLAS_VERSION: u32 = 1;
 

@@ -235,7 +235,7 @@ impl Deck<'_> {
             let mut area = 0.0;
             let rule = surface.kind.quadrature();
             surface.integrate(&rule, &|n| self.mesh.nodes[n as usize], &mut |_, _, normal| {
-                area += papilla_solid::tensor::norm(normal);
+                area += papilla_vector::norm(normal);
             });
             let mean = area / faces.len().max(1) as f64;
             // The area of an edge is its length.

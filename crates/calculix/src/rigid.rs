@@ -11,7 +11,7 @@
 use super::ExportError;
 use papilla_fem::element::reference::HEX27_LATTICE;
 use papilla_sdf::Placement;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// A rigid shape in its own frame, pressing towards +z. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

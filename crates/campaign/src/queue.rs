@@ -6,8 +6,8 @@ use crate::{BoxError, CampaignError, Checkpoints, IndentationSolver, PressError,
 use papilla_dataset as dataset;
 use papilla_dataset::Sample;
 use papilla_fingertip::campaign::Indentation;
+use papilla_processor::thread_s;
 use papilla_progress::Progress;
-use papilla_progress::processor::thread_s;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;

@@ -12,7 +12,7 @@
 mod poses;
 
 use papilla_contact::{Contact, Object, PixelContact, PixelSpacing, Settings, Solver};
-use papilla_progress::processor::thread_s;
+use papilla_processor::thread_s;
 use poses::{DEPTH_MM, Pad, shapes};
 use std::error::Error;
 use std::path::Path;

@@ -1,8 +1,9 @@
 //! The answer of a contact solve: pressure, force, and how far to trust them.
 
-use crate::PA_PER_MPA;
 use crate::model::ContactModel;
 use crate::patch::Patch;
+use papilla_atlas::PA_PER_MPA;
+use papilla_vector::{cross, minus, norm};
 
 /// Pressure and its sums. Filled anew by each frame; keeps its memory.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,7 +82,7 @@ impl Aside {
 
     /// Takes note of whether too much leads along the skin.
     pub(crate) fn judge(self, quality: &mut Quality) {
-        let along_n = self.along_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let along_n = norm(self.along_n);
         quality.is_aside = along_n > ASIDE_N + ASIDE_MAX * self.into_n.max(0.0);
         quality.settled &= !quality.is_aside;
     }
@@ -171,7 +172,7 @@ impl Contact {
 
     /// Multiplies all that presses by `strength`, whose derivative by travel is `slope_per_mm`.
     pub(crate) fn strengthen(&mut self, strength: f64, slope_per_mm: f64) {
-        let size = self.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let size = norm(self.force_n);
         for vertex in &self.touched {
             self.pressure_pa[*vertex as usize] *= strength as f32;
             if let Some(shear_pa) = self.shear_pa.get_mut(*vertex as usize) {
@@ -274,7 +275,5 @@ fn stretch(model: &ContactModel, patch: &Patch, vertex: u32) -> f64 {
 }
 
 fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    let [p, q]: [[f64; 3]; 2] = [b, c].map(|v| std::array::from_fn(|i| v[i] - a[i]));
-    let n = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
-    0.5 * n.iter().map(|v| v * v).sum::<f64>().sqrt()
+    0.5 * norm(cross(minus(b, a), minus(c, a)))
 }

@@ -4,6 +4,7 @@ use crate::answer::{Contact, Effort};
 use crate::error::ContactError;
 use crate::objects::{Scene, View};
 use crate::solver::{Reached, Solver};
+use papilla_vector::norm;
 
 /// Farthest that things travel, mm.
 const TRAVEL_MAX_MM: f64 = 30.0;
@@ -47,7 +48,7 @@ impl Search {
 
 impl NetForce {
     pub(crate) fn validate(&self) -> Result<(), ContactError> {
-        let size = self.direction.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let size = norm(self.direction);
         if !((size - 1.0).abs() < 1e-3) {
             let (member, rule) = ("direction", "has to be a unit vector; this is its length");
             return Err(ContactError::Value { member, value: size, rule });

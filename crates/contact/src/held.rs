@@ -8,6 +8,7 @@
 
 use crate::object::{Object, local};
 use papilla_sdf::{Distance, Placement, SignedDistance};
+use papilla_vector::{dot, norm};
 
 /// Distance from a surface that counts as on it, mm.
 const ON_MM: f64 = 1e-3;
@@ -51,7 +52,7 @@ impl Held {
         let found = shape.distance(p);
         let gap_mm = found.gap_mm - self.widen_mm;
         let found = Distance { gap_mm, ..found };
-        let size = dot(found.normal, found.normal).sqrt();
+        let size = norm(found.normal);
         let along = if size > 0.0 { -dot(found.normal, way) / size } else { 0.0 };
         if (gap_mm >= 0.0 && along >= 0.0) || (gap_mm < 0.0 && along > FRONT) {
             return found;
@@ -109,7 +110,7 @@ fn look(shape: &dyn SignedDistance, p: [f64; 3], way: [f64; 3], widen_mm: f64) -
         let is_met = free <= ON_MM || (step + 1 == STEPS_MAX && free < 10.0 * ON_MM);
         if is_met && at > 0.0 {
             let found = shape.distance(q).normal;
-            let size = dot(found, found).sqrt();
+            let size = norm(found);
             let along = if size > 0.0 { -dot(found, way) / size } else { 1.0 };
             let is_facing = along > 0.0;
             let normal = if is_facing { found } else { way.map(|w| -w) };
@@ -122,8 +123,4 @@ fn look(shape: &dyn SignedDistance, p: [f64; 3], way: [f64; 3], widen_mm: f64) -
         ahead_mm = at - free.max(ON_MM);
     }
     Front::Missed { clear_mm }
-}
-
-pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -61,9 +61,6 @@ mod slopes;
 mod solver;
 mod springs;
 
-/// Pressures are solved for in MPa, and told in Pa.
-const PA_PER_MPA: f64 = 1e6;
-
 pub use answer::{Contact, Effort, Person, Quality};
 pub use budget::WORK_MAX;
 pub use displacement::Displacement;

@@ -9,6 +9,7 @@ use crate::model::ContactModel;
 use crate::nearest::{Nearest, require_friction, require_stiffness};
 use crate::object::{Object, local};
 use papilla_sdf::{Distance, Placement, beneath, may_be_covered};
+use papilla_vector::{cross, dot, norm};
 
 /// What lies round a finger in a frame.
 #[derive(Clone, Copy)]
@@ -61,14 +62,13 @@ pub(crate) fn validate(objects: &[Object]) -> Result<(), ContactError> {
         let mut miss = 0.0f64;
         for i in 0..3 {
             for j in 0..3 {
-                let dot: f64 = (0..3).map(|k| rotation[k][i] * rotation[k][j]).sum();
-                let off = (dot - f64::from(u8::from(i == j))).abs();
+                let product: f64 = (0..3).map(|k| rotation[k][i] * rotation[k][j]).sum();
+                let off = (product - f64::from(u8::from(i == j))).abs();
                 miss = if off <= miss { miss } else { off };
             }
         }
         let [a, b, c] = rotation;
-        let volume = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
-            + a[2] * (b[0] * c[1] - b[1] * c[0]);
+        let volume = dot(a, cross(b, c));
         if !(miss <= ROTATION_MISS_MAX && volume > 0.0) {
             return Err(ContactError::Rotation { object: index, miss });
         }
@@ -171,7 +171,7 @@ impl<'a> View<'a> {
             second_mm = second_mm.min(gap_mm.max(nearest.gap_mm));
             if gap_mm < nearest.gap_mm {
                 let n = found.normal;
-                let size = n.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let size = norm(n);
                 let turned = r.map(|row| (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]) / size);
                 let normal = if size > 1e-6 { turned } else { nearest.normal };
                 let (stiffness_mpa_per_mm, friction) = (o.stiffness_mpa_per_mm, o.friction);

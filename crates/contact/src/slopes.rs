@@ -1,5 +1,7 @@
 //! Slopes of functions that are linear on triangles.
 
+use papilla_vector::{cross, minus, norm, scaled_to_one};
+
 /// What a triangle adds to slopes at its corners.
 #[derive(Debug)]
 pub(crate) struct Slopes {
@@ -13,13 +15,10 @@ pub(crate) struct Slopes {
 pub(crate) fn slopes(positions_mm: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<Slopes> {
     let of = |corners: &[u32; 3]| {
         let x = corners.map(|c| positions_mm[c as usize]);
-        let side = |a: usize, b: usize| -> [f64; 3] { std::array::from_fn(|i| x[b][i] - x[a][i]) };
-        let cross = |p: [f64; 3], q: [f64; 3]| {
-            [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
-        };
+        let side = |a: usize, b: usize| minus(x[b], x[a]);
         let double = cross(side(0, 1), side(0, 2));
-        let size = double.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let unit = double.map(|v| if size > 0.0 { v / size } else { 0.0 });
+        let size = norm(double);
+        let unit = scaled_to_one(double);
         // The gradient of a corner's hat function is the unit normal turned across the opposite
         // side, over twice the area.
         let across = |k: usize| cross(unit, side((k + 1) % 3, (k + 2) % 3));

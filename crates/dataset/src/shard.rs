@@ -4,13 +4,10 @@ use super::{DatasetError, fault, worst_checks};
 use crate::lattice::{TriangleOnLattice, places};
 use crate::record::{Cells, Checks, Sample};
 use ndarray::{Array, Array1, Array2, Array3, Dimension, Ix1, Ix2, Ix3, StrideShape};
-use papilla_atlas::{Atlas, Patch, Raster};
+use papilla_atlas::{Atlas, PA_PER_MPA, Patch, Raster};
 use papilla_output::npz::{NpzArrays, NpzBuilder};
 use papilla_output::{OutputError, atomic};
 use std::path::Path;
-
-/// Pascal per megapascal, and J/m3 per mJ/mm3.
-const PA_PER_MPA: f64 = 1e6;
 
 /// Columns of a shard's `checks` array, in the order of [`Checks`]' fields.
 pub const CHECK_COLUMNS: [&str; 11] = [

@@ -7,6 +7,7 @@ use super::{
 use crate::record::Checks;
 use papilla_atlas::{Atlas, Patch};
 use papilla_output::OutputError;
+use papilla_vector::{cross, minus, norm};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -233,11 +234,7 @@ fn vertex_areas_mm2(atlas: &Atlas) -> Vec<f64> {
     let mut areas = vec![0.0; positions.len()];
     for triangle in atlas.triangles() {
         let [a, b, c] = triangle.map(|i| positions[i as usize].map(f64::from));
-        let edge = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
-        let (u, v) = (edge(b), edge(c));
-        let cross =
-            [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-        let area = 0.5 * cross.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let area = 0.5 * norm(cross(minus(b, a), minus(c, a)));
         for vertex in triangle {
             areas[*vertex as usize] += area / 3.0;
         }

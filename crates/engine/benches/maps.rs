@@ -52,7 +52,8 @@ impl Contact {
 fn main() -> Result<(), Box<dyn Error>> {
     let runs = std::env::var("RUNS").map_or(Ok(200), |runs| runs.parse())?.max(1);
     let names: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    println!("{}, {runs} runs, us: least (median)\n", processor());
+    let (processor, arch) = (papilla_processor::described(), std::env::consts::ARCH);
+    println!("{processor}, {arch}, {runs} runs, us: least (median)\n");
     println!("| network | contact | tract | by rows | tract / by rows |\n|---|---|---|---|---|");
     for name in NETWORKS {
         if !names.is_empty() && !names.iter().any(|wanted| wanted == name) {
@@ -100,18 +101,4 @@ fn times(
         times.sort_unstable_by(f64::total_cmp);
         [times[0], times[times.len() / 2]]
     }))
-}
-
-/// Its name, family and model, as Linux tells them.
-fn processor() -> String {
-    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let value = |key: &str| {
-        let of_key = |line: &str| {
-            let (name, value) = line.split_once(':')?;
-            (name.trim() == key).then(|| value.trim().to_owned())
-        };
-        info.lines().find_map(of_key).unwrap_or_else(|| "?".to_owned())
-    };
-    let [name, family, model] = ["model name", "cpu family", "model"].map(value);
-    format!("{name} (family {family}, model {model}), {}", std::env::consts::ARCH)
 }

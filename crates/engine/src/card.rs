@@ -168,6 +168,29 @@ pub struct Latency {
 }
 
 impl Card {
+    /// The card of a model of which this was measured; what else a card may tell is absent.
+    #[must_use]
+    pub fn of(info: &ModelInfo, metrics: Metrics, latency_ms: Latency) -> Self {
+        Self {
+            format: MODEL_FORMAT,
+            name: info.name.clone(),
+            onnx_sha256: info.onnx_sha256.clone(),
+            bytes: info.bytes,
+            atlas_hash: info.atlas_hash.clone(),
+            effects: info.effects.clone(),
+            network: info.network.clone(),
+            pressure_range_pa: [0.0, info.pressure_max_pa],
+            input_statistics_max: None,
+            response_max_per_mpa: None,
+            sed_max_j_per_m3: info.sed_max_j_per_m3,
+            dataset_sha256: info.dataset_sha256.clone(),
+            training: info.training.clone(),
+            metrics,
+            latency_ms,
+            onnxruntime_difference_max: None,
+        }
+    }
+
     /// Reads a card.
     ///
     /// # Errors

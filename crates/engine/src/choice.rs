@@ -1,6 +1,7 @@
 //! Which engine runs a model: the one that is named, or the faster one.
 
 use crate::{Backend, Card, EngineError, MAP_LEN, Model, Session, load_with, trial_map};
+use papilla_processor::thread_time;
 use serde::{Serialize, Serializer};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -121,24 +122,6 @@ impl Choice {
     }
 }
 
-/// Processor time of this thread. Unlike wall time it does not count interruptions, which are
-/// frequent on a busy machine. Where the system does not tell it (Windows), wall time is used.
-#[cfg(unix)]
-#[must_use]
-pub fn processor_time() -> Duration {
-    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    let seconds = u64::try_from(now.tv_sec).unwrap_or_default();
-    Duration::new(seconds, u32::try_from(now.tv_nsec).unwrap_or_default())
-}
-
-/// Wall time since the first call, since the system does not tell the thread's own time.
-#[cfg(not(unix))]
-#[must_use]
-pub fn processor_time() -> Duration {
-    static BEGUN: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-    BEGUN.get_or_init(Instant::now).elapsed()
-}
-
 /// A comparison of two models that run the same map alternately.
 struct Race {
     /// Least processor time of each. The least is used since disturbances make a run slower, never
@@ -166,9 +149,9 @@ impl Race {
             }
             for ((session, answer), least) in sessions.iter_mut().zip(&mut answers).zip(&mut least)
             {
-                let start = processor_time();
+                let start = thread_time();
                 session.infer(&pressure_pa, answer)?;
-                *least = processor_time().saturating_sub(start).min(*least);
+                *least = thread_time().saturating_sub(start).min(*least);
             }
         }
         let [ours, theirs] = &answers;

@@ -51,7 +51,7 @@ use std::sync::Arc;
 
 pub use backend::Backend;
 pub use card::Card;
-pub use choice::{Choice, processor_time};
+pub use choice::Choice;
 pub use error::EngineError;
 pub use info::ModelInfo;
 pub use ladder::Ladder;

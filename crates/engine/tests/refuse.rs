@@ -294,33 +294,18 @@ fn cards_and_indices_are_checked_when_read() {
 
 fn card_of(info: &ModelInfo) -> Card {
     let spread = Spread { median: 0.1, p95: 0.2 };
-    Card {
-        format: 1,
-        name: info.name.clone(),
-        onnx_sha256: info.onnx_sha256.clone(),
-        bytes: info.bytes,
-        atlas_hash: info.atlas_hash.clone(),
-        effects: info.effects.clone(),
-        network: info.network.clone(),
-        pressure_range_pa: [0.0, info.pressure_max_pa],
-        input_statistics_max: None,
-        response_max_per_mpa: None,
-        sed_max_j_per_m3: info.sed_max_j_per_m3,
-        dataset_sha256: info.dataset_sha256.clone(),
-        training: json!({"seed": 7}),
-        metrics: Metrics {
-            dataset_sha256: None,
-            split: "test".into(),
-            samples: 1,
-            relative_l2: spread,
-            far_field_relative_l2: None,
-            peak_error: spread,
-            peak_distance_mm: None,
-            nail_base_error: None,
-            total_energy_error: spread,
-            ssim: Similarity { median: 0.9, p5: 0.8 },
-        },
-        latency_ms: Latency { backend: info.backend.clone(), threads: 1, p50: 1.0, p99: 2.0 },
-        onnxruntime_difference_max: None,
-    }
+    let metrics = Metrics {
+        dataset_sha256: None,
+        split: "test".into(),
+        samples: 1,
+        relative_l2: spread,
+        far_field_relative_l2: None,
+        peak_error: spread,
+        peak_distance_mm: None,
+        nail_base_error: None,
+        total_energy_error: spread,
+        ssim: Similarity { median: 0.9, p5: 0.8 },
+    };
+    let latency_ms = Latency { backend: info.backend.clone(), threads: 1, p50: 1.0, p99: 2.0 };
+    Card { training: json!({"seed": 7}), ..Card::of(info, metrics, latency_ms) }
 }

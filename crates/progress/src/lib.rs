@@ -1,5 +1,4 @@
-//! How far long work is: a bar on a terminal, elsewhere a line every few seconds. And what it took:
-//! [`processor`].
+//! How far long work is: a bar on a terminal, elsewhere a line every few seconds.
 //!
 //! ```
 //! use papilla_progress::Progress;
@@ -10,8 +9,6 @@
 //!     progress.inc();
 //! }
 //! ```
-
-pub mod processor;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write as _;

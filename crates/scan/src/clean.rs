@@ -2,7 +2,7 @@
 //! small holes closed. Each is said.
 
 use crate::{ScanError, Surface};
-use papilla_sdf::vector::{cross, dot, minus, norm};
+use papilla_vector::{cross, dot, minus, norm};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Pieces of less than this share of the largest are dropped.

@@ -10,8 +10,8 @@ use papilla_fingertip::geometry::fingertip::offset::at_uv;
 use papilla_fingertip::mesh::fingertip::check_elements;
 use papilla_fingertip::scene::finger::{FIELDS, SKIN_FILE, Source, Thickness};
 use papilla_fingertip::scene::{Finger, FingerError};
-use papilla_sdf::vector::{cross, dot, minus, norm};
 use papilla_sdf::{MeshDistance, Placement};
+use papilla_vector::{cross, dot, minus, norm};
 
 /// Rows and columns of the places where the template is compared with the surface.
 const PLACES: [u32; 2] = [24, 32];

@@ -5,7 +5,7 @@ use crate::{ScanError, Surface};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::scene::finger::FIELDS;
 use papilla_sdf::Placement;
-use papilla_sdf::vector::dot;
+use papilla_vector::dot;
 
 /// How far the plate's surface may be from the skin's, mm: a plate's thickness, a free edge, noise.
 const AWAY_MAX_MM: f64 = 3.0;

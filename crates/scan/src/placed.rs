@@ -1,8 +1,8 @@
 //! A surface, and how far a point of the finger's frame is from it.
 
 use crate::{ScanError, Surface};
-use papilla_sdf::vector::dot;
 use papilla_sdf::{Mesh, MeshDistance, Placement};
+use papilla_vector::dot;
 
 /// A surface in the finger's frame.
 pub struct Placed {

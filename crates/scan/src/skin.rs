@@ -6,7 +6,7 @@ use papilla_fingertip::geometry::fingertip::offset::{
     COLUMNS, OFFSET_MAX_MM, ROWS, at_uv, weights,
 };
 use papilla_fingertip::geometry::fingertip::{FingertipShape, SkinOffset};
-use papilla_sdf::vector::dot;
+use papilla_vector::dot;
 use std::sync::Arc;
 
 /// Rows and columns of the places where distances are taken.

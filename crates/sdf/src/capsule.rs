@@ -41,7 +41,7 @@ impl From<&Capsule> for Cylinder {
 mod tests {
     use super::*;
     use crate::SignedDistance;
-    use crate::vector::norm;
+    use papilla_vector::norm;
     use proptest::prelude::*;
 
     proptest! {

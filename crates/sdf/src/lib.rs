@@ -42,7 +42,6 @@ mod testing;
 mod torus;
 mod touch;
 mod union;
-pub mod vector;
 mod wedge;
 
 pub use announced::{AnnouncedError, AnnouncedPart, AnnouncedShape, AnnouncedUnion, HeightGrid};

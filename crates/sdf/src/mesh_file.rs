@@ -121,7 +121,7 @@ impl MeshFile {
 
     /// How far it goes along a unit vector, mm; infinite before the file was read.
     pub(super) fn bound_mm(&self, direction: [f64; 3]) -> f64 {
-        let along = |p: &[f64; 3]| crate::vector::dot(*p, direction);
+        let along = |p: &[f64; 3]| papilla_vector::dot(*p, direction);
         self.mesh.as_ref().map_or(f64::INFINITY, |mesh| {
             mesh.vertices_mm.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
         })

@@ -5,7 +5,7 @@
 //! ```
 
 use super::{Distance, SignedDistance};
-use crate::vector::{along, norm};
+use papilla_vector::{along, norm};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 

@@ -88,8 +88,8 @@ impl SignedDistance for Torus {
 mod tests {
     use super::*;
     use crate::testing::{Exactness, distance_tests};
-    use crate::vector::{minus, norm};
     use crate::{Placed, Placement};
+    use papilla_vector::{minus, norm};
     use proptest::prelude::*;
     use std::sync::Arc;
 

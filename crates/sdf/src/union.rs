@@ -2,6 +2,7 @@
 
 use super::beneath::{beneath, may_be_covered};
 use super::{Distance, Placed, SignedDistance};
+use papilla_vector::norm;
 
 /// The union of parts: outside, its gap is that of the nearest one; inside, that of the outer
 /// surface of all, see [`beneath`]. Faces that other parts cover do not count.
@@ -37,7 +38,7 @@ impl Ball {
             return Self { centre_mm: [0.0; 3], radius_mm: f64::INFINITY };
         }
         let half = ends.map(|[low, high]| 0.5 * (high - low));
-        let radius_mm = half.iter().map(|h| h * h).sum::<f64>().sqrt();
+        let radius_mm = norm(half);
         Self { centre_mm: ends.map(|[low, high]| 0.5 * (low + high)), radius_mm }
     }
 

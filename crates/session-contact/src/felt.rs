@@ -2,6 +2,7 @@
 
 use papilla_contact::{Contact, Person};
 use papilla_proto::contact::ContactMethod;
+use papilla_vector::norm;
 
 /// What contact found of rigid objects without friction, on a finger of reference width and
 /// stiffness: by these numbers the error of a force is told. There is none of a solve that did not
@@ -26,7 +27,7 @@ impl Felt {
             return None;
         }
         let Person { width, stiffness } = person;
-        let force_n = force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let force_n = norm(*force_n);
         Some(Self {
             method,
             force_n: (force_n / (stiffness * width * width)) as f32,

@@ -1,5 +1,6 @@
 //! One finger of a session: its solver, from frame to frame.
 
+use papilla_vector::norm;
 use std::{fmt, sync::Arc, time::Instant};
 
 use bytes::BytesMut;
@@ -549,7 +550,7 @@ fn net_force([x, y, z, force_n]: [f32; 4]) -> Result<Option<NetForce>, Problem> 
         return Err(unusable("force_n", format!("{force_n} N is no net force; 0 asks for none")));
     }
     let direction = [x, y, z].map(f64::from);
-    let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let size = norm(direction);
     if !((size - 1.0).abs() < 1e-3) {
         return Err(unusable("direction", format!("a unit vector is due; this has length {size}")));
     }

@@ -5,6 +5,7 @@ use papilla_proto::{
     atlas::{Atlas, Patch, Raster},
     effects::Place,
 };
+use papilla_vector::{cross, norm};
 
 use super::unusable;
 
@@ -95,9 +96,7 @@ fn areas_mm2(atlas: &Atlas, raster: &Raster, patch: Patch) -> Vec<f32> {
         .map(|corners| {
             let [a, b, c] = corners.map(|vertex| vertices.positions_mm[vertex as usize]);
             let side = |p: [f32; 3], q: [f32; 3]| [0, 1, 2].map(|i| f64::from(q[i] - p[i]));
-            let ([ax, ay, az], [bx, by, bz]) = (side(a, b), side(a, c));
-            let normal = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-            let doubled_mm2 = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+            let doubled_mm2 = norm(cross(side(a, b), side(a, c)));
             let [a, b, c] = corners.map(|vertex| vertices.uv_px[vertex as usize].map(f64::from));
             let doubled_px2 = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
             if doubled_px2 > 0.0 { (doubled_mm2 / doubled_px2) as f32 } else { 0.0 }

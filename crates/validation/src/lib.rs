@@ -16,6 +16,6 @@
 
 pub mod convergence;
 mod csv;
-pub mod part;
 pub mod stability;
+pub mod stored;
 pub mod verify;

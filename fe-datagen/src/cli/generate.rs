@@ -1,8 +1,8 @@
 //! `generate`: solves a campaign into a dataset, or one slice of it.
 
 use super::campaign_file::CampaignFile;
-use super::part::Part;
 use super::signals::{self, REQUEUE};
+use super::slice::SliceOption;
 use super::{CHECKS_FAILED, print, wrong_usage};
 use papilla_campaign::{RunOptions, generate};
 use std::num::NonZero;
@@ -32,7 +32,7 @@ pub(super) struct Args {
     #[arg(long)]
     out: PathBuf,
     #[command(flatten)]
-    part: Part,
+    slice: SliceOption,
     /// Indentations solved at a time [default: one per core].
     #[arg(long)]
     threads: Option<NonZero<usize>>,
@@ -45,7 +45,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let slice = match args.part.slice() {
+    let slice = match args.slice.slice() {
         Ok(slice) => slice,
         Err(error) => return Ok(wrong_usage(&error)),
     };

@@ -5,7 +5,8 @@ use super::print;
 use crate::influence_file::{self, Card};
 use papilla_fingertip::influence;
 use papilla_fingertip::mesh::fingertip::Order;
-use papilla_progress::{Progress, processor};
+use papilla_processor::thread_s;
+use papilla_progress::Progress;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -42,7 +43,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     // Before minutes of work: can it be written?
     papilla_output::atomic::create_folder(&args.out)?;
-    let begun_s = processor::thread_s();
+    let begun_s = thread_s();
     let finger = super::chosen_finger::named(args.finger.as_deref())?;
     let (order, materials) = (Order::Linear, finger.tissue);
     let density = args.density.into();
@@ -51,7 +52,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let progress = Progress::new("vertices", vertices, 0, args.json);
     let operator = influence::build(&body, &mut |done| progress.set_position(done))?;
     drop(progress);
-    let seconds = processor::thread_s() - begun_s;
+    let seconds = thread_s() - begun_s;
     let card = Card::new(&operator, density, order, &materials, seconds);
     influence_file::write(&args.out, &operator, &card)?;
     print(&card, args.json, || {

@@ -1,8 +1,8 @@
 //! What `solve` writes of a plane section: values along the skin.
 
+use papilla_atlas::PA_PER_MPA;
 use papilla_fingertip::scene::{Output, Scene};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_output::OutputError;
 use papilla_output::npz::NpzBuilder;

@@ -1,6 +1,6 @@
 //! `stability`: a suite of hard cases with names, and thousands of random scenes.
 
-use super::part::Part;
+use super::slice::SliceOption;
 use super::{CHECKS_FAILED, choices, print, wrong_usage};
 use anyhow::Context as _;
 use papilla_fingertip::campaign::CampaignSpec;
@@ -52,7 +52,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", requires = "out")]
     scenes: Option<NonZero<usize>>,
     #[command(flatten)]
-    part: Part,
+    slice: SliceOption,
     /// Seed of the random scenes.
     #[arg(long, default_value_t = 5)]
     seed: u64,
@@ -79,7 +79,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     match (args.scenes, &args.out) {
         (Some(count), Some(out)) => {
-            let slice = match args.part.slice() {
+            let slice = match args.slice.slice() {
                 Ok(slice) => slice,
                 Err(error) => return Ok(wrong_usage(&error)),
             };
@@ -106,7 +106,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             print(&report, args.json, || report.to_string())?;
             Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
         }
-        _ if args.part.is_given() => {
+        _ if args.slice.is_given() => {
             eprintln!("error: --slice is a part of --scenes");
             Ok(ExitCode::from(2))
         }

@@ -14,7 +14,7 @@ mod states;
 pub(crate) use self::fit::FOLDS;
 use self::fit::{Checked, Form, checked, checked_without_its_set, law, usable, weighed};
 use crate::metrics::quantile;
-use crate::part::Part;
+use crate::split::SplitOrAll;
 use papilla_dataset::Split;
 use papilla_engine::MODEL_FORMAT;
 use papilla_engine::error_law::{ErrorLaws, Fact, MethodLaw, NetworkLaws};
@@ -32,7 +32,7 @@ pub struct Set {
     pub folder: &'static str,
     /// What it holds.
     pub about: &'static str,
-    part: Part,
+    split: SplitOrAll,
     /// The bound holds in each group by itself.
     group: &'static str,
     /// It is set aside: nothing is fitted to it.
@@ -47,7 +47,7 @@ impl Set {
     const PLAIN: Self = Self {
         folder: "",
         about: "",
-        part: Part::Split(Split::Test),
+        split: SplitOrAll::Split(Split::Test),
         group: "trained shapes",
         is_final: false,
         simulations_max: f64::INFINITY,
@@ -80,13 +80,13 @@ pub const SETS: [Set; 11] = [
     Set {
         folder: "fidelity",
         about: "likewise, on the finest mesh",
-        part: Part::All,
+        split: SplitOrAll::All,
         ..Set::PLAIN
     },
     Set {
         folder: "heldout-graded",
         about: "shapes that training never saw: *unseen shapes*",
-        part: Part::All,
+        split: SplitOrAll::All,
         group: "unseen shapes",
         ..Set::PLAIN
     },
@@ -111,14 +111,14 @@ pub const SETS: [Set; 11] = [
     Set {
         folder: "deep-graded",
         about: "2.2 and 2.6 mm deep",
-        part: Part::All,
+        split: SplitOrAll::All,
         group: "hard and deep",
         ..Set::PLAIN
     },
     Set {
         folder: "s1-graded",
         about: "one plate at angles to 45 degrees; every 16th of its states",
-        part: Part::All,
+        split: SplitOrAll::All,
         group: "tilted plates",
         simulations_max: 15.0,
         every: 16,
@@ -127,7 +127,7 @@ pub const SETS: [Set; 11] = [
     Set {
         folder: "final",
         about: "other shapes, on the finest mesh: the *reference set*",
-        part: Part::All,
+        split: SplitOrAll::All,
         group: "set aside",
         is_final: true,
         ..Set::PLAIN
@@ -135,7 +135,7 @@ pub const SETS: [Set; 11] = [
     Set {
         folder: "final-anew",
         about: "the same shapes in other poses: *twelve more*",
-        part: Part::All,
+        split: SplitOrAll::All,
         group: "set aside",
         is_final: true,
         ..Set::PLAIN

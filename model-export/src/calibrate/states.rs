@@ -5,7 +5,7 @@ use super::{METHODS, SETS, Set};
 use crate::contact::{Models, Placed, Rung, pixel_contact};
 use crate::dataset::Dataset;
 use crate::metrics::relative_l2_on;
-use crate::part::Part;
+use crate::split::SplitOrAll;
 use crate::{ExportError, read, read_text};
 use papilla_contact::{Contact, Person, PixelContact, Scene, Solver};
 use papilla_dataset::{IndentationEntry, Shard};
@@ -17,6 +17,7 @@ use papilla_proto::effects::OutOfRange;
 use papilla_proto::{MapSummary, PressureRange, flags, peak};
 use papilla_render::{Known, Maps, Read, Rendering, SkinPixels, Source, facts_of_force};
 use papilla_session_contact::Felt;
+use papilla_vector::norm;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
@@ -222,9 +223,9 @@ impl States {
                 crate::evaluate::require_atlas(&what, atlas, network.model.info())?;
             }
             dataset.atlas().hash().clone_into(&mut states.atlas_hash);
-            let indentations = match set.part {
-                Part::All => dataset.every_indentation(),
-                part @ Part::Split(_) => dataset.indentations(part)?,
+            let indentations = match set.split {
+                SplitOrAll::All => dataset.every_indentation(),
+                split @ SplitOrAll::Split(_) => dataset.indentations(split)?,
             };
             let skin = SkinPixels::from(dataset.maps.raster(Patch::Skin));
             let mut finders = Finder::all(&models, &dataset);
@@ -274,9 +275,8 @@ impl States {
             let method = finder.method;
             let felt = Felt::of(method, &out, Person::default());
             let source = felt.map_or(Source::Other, Source::Contact);
-            let size = |force: [f64; 3]| force.iter().map(|f| f * f).sum::<f64>().sqrt();
-            let due = size([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
-            let error = (size(out.force_n) / due - 1.0).abs();
+            let due = norm([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
+            let error = (norm(out.force_n) / due - 1.0).abs();
             let (is_flagged, facts) =
                 felt.map_or((true, Facts::default()), |felt| (false, facts_of_force(felt)));
             let case = at.case(None, Some(method));

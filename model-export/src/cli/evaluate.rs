@@ -8,8 +8,8 @@ use papilla_engine::ladder::Kind;
 use papilla_engine::{Backend, Model, ModelInfo};
 use papilla_model_export::dataset::Dataset;
 use papilla_model_export::evaluate::{self, ByIndenter, Evaluation, Subject};
-use papilla_model_export::part::Part;
 use papilla_model_export::reference::{Recorded, TOLERANCE};
+use papilla_model_export::split::SplitOrAll;
 use papilla_model_export::{ExportError, picture, write};
 use papilla_progress::Progress;
 use serde_json::json;
@@ -27,8 +27,8 @@ pub(crate) struct Options {
     #[arg(long, conflicts_with = "card")]
     similarity: bool,
     /// Which indentations: `test` (held out), `train` or `all`.
-    #[arg(long, default_value_t = Part::Split(Split::Test), value_name = "SPLIT")]
-    split: Part,
+    #[arg(long, default_value_t = SplitOrAll::Split(Split::Test), value_name = "SPLIT")]
+    split: SplitOrAll,
     /// Write the card here, such as models/NAME.json. Needs the dataset that the model was
     /// trained on (of several, one of them; any, for a model that learnt nothing) and the split `test`.
     #[arg(long, value_name = "FILE")]
@@ -90,7 +90,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
 
 /// A card tells of indentations that the training never saw.
 fn require_held_out(options: &Options, info: &ModelInfo, dataset: &Dataset) -> anyhow::Result<()> {
-    if options.split != Part::Split(Split::Test) {
+    if options.split != SplitOrAll::Split(Split::Test) {
         anyhow::bail!("a card tells of held-out presses: --card needs --split test");
     }
     let trained = info.datasets();

@@ -10,7 +10,6 @@ pub(crate) use self::placed::Placed;
 pub use self::pseudo_labels::{Labeller, PseudoLabels};
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile, relative_l2};
-use crate::processor::thread_s;
 use crate::{ExportError, read};
 use papilla_contact::{
     Contact, ContactModel, Gaps, Method, Object, PixelContact, PixelSkin, PixelSpacing, Scene,
@@ -18,8 +17,10 @@ use papilla_contact::{
 };
 use papilla_dataset::{IndentationEntry, Shard, Split, sha256_hex};
 use papilla_engine::{MAP_LEN, Session};
+use papilla_processor::thread_s;
 use papilla_proto::atlas::Patch;
 use papilla_proto::contact::{ContactErrors, ContactMethod, MethodError, MethodErrors, Spread};
+use papilla_vector::norm;
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -347,7 +348,6 @@ impl Figures {
             None => skin.rasterise(&out.pressure_pa, &mut pressure_pa).map_err(refused)?,
         }
         dataset.draw_pressure(indentation, shard, state, &mut truth)?;
-        let norm = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
         self.pressure.extend(relative_l2(&pressure_pa, &truth));
         let due = norm([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
         self.force.push((norm(out.force_n) / due - 1.0).abs());

@@ -1,4 +1,4 @@
-//! Runs a model over a part of a dataset in the engine that will serve it.
+//! Runs a model over a split of a dataset in the engine that will serve it.
 
 mod by_indenter;
 
@@ -7,11 +7,11 @@ pub use by_indenter::ByIndenter;
 use crate::ExportError;
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile, summarise};
-use crate::part::Part;
 use crate::reference::relative_difference;
+use crate::split::SplitOrAll;
 use papilla_dataset::{IndentationEntry, Shard};
 use papilla_engine::card::{Card, Latency, Metrics};
-use papilla_engine::{MAP_LEN, MODEL_FORMAT, Model, ModelInfo, Session};
+use papilla_engine::{MAP_LEN, Model, ModelInfo, Session};
 use serde::Serialize;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 /// Inferences before the clock counts: caches fill, pages are touched.
 const WARM_UP: usize = 3;
 
-/// One sample of the part and how well the model met it.
+/// One sample of the split and how well the model met it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Sample {
     /// Id of the indentation.
@@ -77,7 +77,7 @@ impl Maps {
     }
 }
 
-/// A model measured on a part.
+/// A model measured on a split.
 #[derive(Clone, Debug, Serialize)]
 pub struct Evaluation {
     /// Median and spread of the figures.
@@ -88,7 +88,7 @@ pub struct Evaluation {
     pub other_engine_difference_max: Option<f64>,
     /// Time of one inference in the second engine, if one was given.
     pub other_engine_latency_ms: Option<Latency>,
-    /// Every sample, in the order of the part.
+    /// Every sample, in the order of the split.
     pub samples: Vec<Sample>,
 }
 
@@ -106,24 +106,8 @@ impl Evaluation {
     /// The card of the model.
     #[must_use]
     pub fn card(&self, info: &ModelInfo, onnxruntime_difference_max: Option<f64>) -> Card {
-        Card {
-            format: MODEL_FORMAT,
-            name: info.name.clone(),
-            onnx_sha256: info.onnx_sha256.clone(),
-            bytes: info.bytes,
-            atlas_hash: info.atlas_hash.clone(),
-            effects: info.effects.clone(),
-            network: info.network.clone(),
-            pressure_range_pa: [0.0, info.pressure_max_pa],
-            input_statistics_max: None,
-            response_max_per_mpa: None,
-            sed_max_j_per_m3: info.sed_max_j_per_m3,
-            dataset_sha256: info.dataset_sha256.clone(),
-            training: info.training.clone(),
-            metrics: self.metrics.clone(),
-            latency_ms: self.latency_ms.clone(),
-            onnxruntime_difference_max,
-        }
+        let card = Card::of(info, self.metrics.clone(), self.latency_ms.clone());
+        Card { onnxruntime_difference_max, ..card }
     }
 }
 
@@ -137,7 +121,7 @@ pub struct Subject<'a> {
     pub similarity: bool,
 }
 
-/// Measures `subject` on every sample of `part`.
+/// Measures `subject` on every sample of `split`.
 ///
 /// With `other`, the same model in a second engine, both answer every sample and the
 /// greatest difference is kept. `step` is called after each sample.
@@ -149,7 +133,7 @@ pub fn run(
     subject: &Subject<'_>,
     other: Option<&dyn Model>,
     dataset: &Dataset,
-    part: Part,
+    split: SplitOrAll,
     mut step: impl FnMut(),
 ) -> Result<Evaluation, ExportError> {
     let info = subject.model.info();
@@ -161,7 +145,7 @@ pub fn run(
     let mut difference = None;
     let mut samples = Vec::new();
     let mut maps = Maps::default();
-    for indentation in dataset.indentations(part)? {
+    for indentation in dataset.indentations(split)? {
         let path = dataset.shard_path(indentation);
         let shard = dataset.shard(indentation)?;
         for index in 0..indentation.samples {
@@ -198,8 +182,8 @@ pub fn run(
         }
     }
     let figures: Vec<SampleMetrics> = samples.iter().map(|sample| sample.metrics).collect();
-    let empty = || ExportError::EmptyPart { path: dataset.folder().into(), part };
-    let metrics = summarise(&part.to_string(), &figures).ok_or_else(empty)?;
+    let empty = || ExportError::EmptySplit { path: dataset.folder().into(), split };
+    let metrics = summarise(&split.to_string(), &figures).ok_or_else(empty)?;
     Ok(Evaluation {
         metrics: Metrics { dataset_sha256: Some(dataset.sha256().to_owned()), ..metrics },
         latency_ms: bench.latency(info),
@@ -222,7 +206,7 @@ pub fn maps_of(
 ) -> Result<Maps, ExportError> {
     let mut maps = Maps::default();
     for indentation in dataset
-        .indentations(Part::All)?
+        .indentations(SplitOrAll::All)?
         .into_iter()
         .filter(|indentation| indentation.id == sample.indentation)
     {

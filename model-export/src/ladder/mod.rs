@@ -179,22 +179,10 @@ pub fn measure(
     Ok(ladder)
 }
 
-/// Processor and system, for a reader who compares times. A virtual machine may tell no more than
-/// the maker by name; family and model then say which processor it is.
+/// Processor and system, for a reader who compares times.
 #[must_use]
 pub fn machine() -> String {
-    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let entry = |key: &str| {
-        let mut entries = info.lines().filter_map(|line| line.split_once(':'));
-        let found = entries.find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim());
-        found.unwrap_or("unknown")
-    };
-    let processor = format!(
-        "{} (family {}, model {})",
-        entry("model name"),
-        entry("cpu family"),
-        entry("model")
-    );
+    let processor = papilla_processor::described();
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     format!(
         "{processor}, {cores} cores, {} {}; one thread",

@@ -5,7 +5,7 @@ use crate::ExportError;
 use crate::contact::{ContactMaps, Models};
 use crate::dataset::Dataset;
 use crate::evaluate::require_same_atlas;
-use crate::part::Part;
+use crate::split::SplitOrAll;
 use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::{
     MAP_LEN,
@@ -102,14 +102,14 @@ pub(super) struct Source {
     name: &'static str,
     folder: &'static str,
     about: &'static str,
-    part: Part,
+    split: SplitOrAll,
 }
 
 const REFERENCE: Source = Source {
     name: REFERENCE_SET,
     folder: "final",
     about: "presses on the finest mesh, of shapes, poses and a seed by which nothing was chosen",
-    part: Part::All,
+    split: SplitOrAll::All,
 };
 
 const SOURCES: [Source; 7] = [
@@ -117,40 +117,40 @@ const SOURCES: [Source; 7] = [
         name: "heldout-presses",
         folder: "broad-graded",
         about: "presses that no training saw, of the shapes and depths it saw",
-        part: Part::Split(Split::Test),
+        split: SplitOrAll::Split(Split::Test),
     },
     Source {
         name: "heldout-shapes",
         folder: "heldout-graded",
         about: "shapes that no training saw",
-        part: Part::All,
+        split: SplitOrAll::All,
     },
     REFERENCE,
     Source {
         name: "reference-anew",
         folder: "final-anew",
         about: "the same shapes on the finest mesh in other poses, solved when everything was decided",
-        part: Part::All,
+        split: SplitOrAll::All,
     },
     Source {
         name: "reference-shapes",
         folder: "final-shapes",
         about: "twelve shapes that no other set has, on the finest mesh, solved when everything was \
                 decided",
-        part: Part::All,
+        split: SplitOrAll::All,
     },
     Source {
         name: "pressed",
         folder: "pressed-graded",
         about: "presses that no training saw: a plate to 7 N, a key, gratings, Braille",
-        part: Part::Split(Split::Test),
+        split: SplitOrAll::Split(Split::Test),
     },
     Source {
         name: "s1",
         folder: "s1-graded",
         about: "presses of the published campaign that no training saw, a plate alone, by the \
                 teacher",
-        part: Part::Split(Split::Test),
+        split: SplitOrAll::Split(Split::Test),
     },
 ];
 
@@ -190,7 +190,7 @@ pub(super) fn from_poses(
         )?;
         models.require_atlas(&dataset, folder)?;
         let maps =
-            ContactMaps::of_indentations(&models, &dataset, dataset.indentations(source.part)?)?;
+            ContactMaps::of_indentations(&models, &dataset, dataset.indentations(source.split)?)?;
         left_out += maps.left_out;
         let mut states = source.taken_of(&dataset)?.states.into_iter();
         for (k, (press, state)) in maps.press.iter().zip(&maps.state).enumerate() {
@@ -220,7 +220,7 @@ const LEARNT: Source = Source {
     name: "training",
     folder: "",
     about: "what networks learnt from",
-    part: Part::Split(Split::Train),
+    split: SplitOrAll::Split(Split::Train),
 };
 
 /// Reads the sets whose datasets are in `data`; the others come out empty and say why.
@@ -252,7 +252,7 @@ impl Source {
             dataset_sha256: Some(dataset.sha256().to_owned()),
             states: Vec::new(),
         };
-        for indentation in dataset.indentations(self.part)? {
+        for indentation in dataset.indentations(self.split)? {
             self.take(dataset, indentation, &mut set.states)?;
         }
         Ok(set)

@@ -2,9 +2,6 @@
 
 use papilla_output::canvas::viridis;
 
-/// Colour of pixels outside the patch.
-pub(super) const OUTSIDE: [u8; 3] = [226, 226, 226];
-
 /// How a number in 0..=1 becomes a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scale {

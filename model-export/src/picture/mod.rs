@@ -1,14 +1,12 @@
 //! Pictures of a sample: pressure, truth, prediction and error side by side.
 
-mod canvas;
 mod colour;
 
 use crate::ExportError;
 use crate::dataset::Dataset;
 use crate::evaluate::{Maps, Sample};
-use canvas::Canvas;
 use colour::Scale;
-use image::RgbImage;
+use papilla_output::canvas::{BLACK, Canvas, OUTSIDE, TEXT_WIDTH_PX};
 use papilla_proto::{MAP_LEN, MAP_SIDE_PX, atlas::Patch};
 use std::path::Path;
 
@@ -34,7 +32,7 @@ struct Panel<'a> {
 
 /// Draws one sample. `heading` stands above, such as `worst of 200`.
 #[must_use]
-pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> RgbImage {
+pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> Canvas {
     let pressure = maps.pressure_pa.iter().map(|v| v / 1e3).collect::<Vec<_>>();
     let (truth, predicted) = (maps.truth_j_per_m3.clone(), maps.predicted_j_per_m3.clone());
     let error: Vec<f32> = (0..MAP_LEN).map(|i| predicted[i] - truth[i]).collect();
@@ -90,7 +88,7 @@ pub struct Picture<'a> {
 
 /// Draws maps side by side.
 #[must_use]
-pub fn sheet<const N: usize>(heading: &str, pictures: [Picture<'_>; N]) -> RgbImage {
+pub fn sheet<const N: usize>(heading: &str, pictures: [Picture<'_>; N]) -> Canvas {
     let panels = pictures.map(|Picture { title, values, mask, max, unit }| Panel {
         title,
         values,
@@ -102,26 +100,23 @@ pub fn sheet<const N: usize>(heading: &str, pictures: [Picture<'_>; N]) -> RgbIm
     laid_out(heading, &panels)
 }
 
-fn laid_out(heading: &str, panels: &[Panel<'_>]) -> RgbImage {
+fn laid_out(heading: &str, panels: &[Panel<'_>]) -> Canvas {
     let width = panels.len() * PANEL + (panels.len() + 1) * GAP;
     let mut canvas = Canvas::new(width, HEAD + PANEL + FOOT);
-    canvas.text(GAP, 8, heading);
+    canvas.text((GAP, 8), heading, BLACK);
     for (i, panel) in panels.iter().enumerate() {
         draw_panel(&mut canvas, GAP + i * (PANEL + GAP), panel);
     }
-    canvas.into_image()
+    canvas
 }
 
 /// Writes a picture as PNG.
 ///
 /// # Errors
 /// [`ExportError::Picture`], [`ExportError::Io`].
-pub fn write_png(image: &RgbImage, path: &Path) -> Result<(), ExportError> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    image
-        .write_to(&mut bytes, image::ImageFormat::Png)
-        .map_err(|source| ExportError::Picture { path: path.to_owned(), source })?;
-    crate::write(path, bytes.get_ref())
+pub fn write_png(picture: &Canvas, path: &Path) -> Result<(), ExportError> {
+    let refused = |source| ExportError::Picture { path: path.to_owned(), source };
+    crate::write(path, &picture.encode_png().map_err(refused)?)
 }
 
 fn describe(heading: &str, sample: &Sample) -> String {
@@ -143,34 +138,26 @@ fn describe(heading: &str, sample: &Sample) -> String {
 }
 
 fn draw_panel(canvas: &mut Canvas, left: usize, panel: &Panel<'_>) {
-    canvas.text(left, 32, &panel.title);
+    canvas.text((left, 32), &panel.title, BLACK);
     let [low, high] = panel.ends;
     // A map of one value has the colour of the lower end.
     let span = if high > low { high - low } else { 1.0 };
-    for row in 0..PANEL {
-        for column in 0..PANEL {
-            let i = row / ZOOM * MAP_SIDE_PX + column / ZOOM;
-            let colour = if panel.mask[i] {
-                panel.scale.colour((panel.values[i] - low) / span)
-            } else {
-                colour::OUTSIDE
-            };
-            canvas.set(left + column, HEAD + row, colour);
-        }
+    for (i, (value, is_inside)) in panel.values.iter().zip(panel.mask).enumerate() {
+        let (row, column) = (i / MAP_SIDE_PX, i % MAP_SIDE_PX);
+        let colour = if *is_inside { panel.scale.colour((value - low) / span) } else { OUTSIDE };
+        canvas.fill((left + ZOOM * column, HEAD + ZOOM * row), (ZOOM, ZOOM), colour);
     }
     let top = HEAD + PANEL + 8;
     for column in 0..PANEL {
         let colour = panel.scale.colour(column as f32 / (PANEL - 1) as f32);
-        for row in 0..BAR {
-            canvas.set(left + column, top + row, colour);
-        }
+        canvas.fill((left + column, top), (1, BAR), colour);
     }
     let middle = 0.5 * (low + high);
     for (place, value) in [(0.0, low), (0.5, middle), (1.0, high)] {
         let label =
             if place > 0.9 { format!("{} {}", number(value), panel.unit) } else { number(value) };
-        let free = PANEL - Canvas::text_width(&label);
-        canvas.text(left + (place * free as f32) as usize, top + BAR + 6, &label);
+        let free = PANEL - label.chars().count() * TEXT_WIDTH_PX;
+        canvas.text((left + (place * free as f32) as usize, top + BAR + 6), &label, BLACK);
     }
 }
 

@@ -6,7 +6,6 @@ mod state;
 
 pub use report::markdown;
 
-use image::RgbImage;
 use papilla_actuators::{Array, HalfSpace, Inverse, Pin};
 use papilla_dataset::Split;
 use papilla_engine::{EngineError, Model, Session};
@@ -14,6 +13,7 @@ use papilla_model_export::dataset::Dataset;
 use papilla_model_export::metrics::quantile;
 use papilla_model_export::picture::{Picture, sheet};
 use papilla_model_export::{ExportError, evaluate};
+use papilla_output::canvas::Canvas;
 use papilla_proto::MAP_LEN;
 use papilla_proto::atlas::Patch;
 use papilla_session_effects::{Finger, Shared};
@@ -168,7 +168,7 @@ pub fn measure(
     networks: Networks<'_>,
     pitch_mm: f32,
     every: usize,
-) -> Result<(Table, RgbImage), ActuatorsError> {
+) -> Result<(Table, Canvas), ActuatorsError> {
     let Networks { served, judge } = networks;
     for model in [served, judge] {
         evaluate::require_atlas(dataset.name(), dataset.atlas().hash(), model.info())?;
@@ -254,12 +254,12 @@ fn table(work: &Work<'_>, states: &[State], pitch_mm: f32, pins: usize) -> Table
 }
 
 /// The state whose corrected drive has the median error: the press, what the drives give, the pins.
-fn drawn(work: &mut Work<'_>, states: &[State], gain: f32) -> Result<RgbImage, ExportError> {
+fn drawn(work: &mut Work<'_>, states: &[State], gain: f32) -> Result<Canvas, ExportError> {
     let l2 = |state: &&State, way: Way| state.errors[way as usize].map_or(f64::NAN, |[l2, ..]| l2);
     let mut order: Vec<&State> = states.iter().collect();
     order.sort_by(|a, b| l2(a, Way::Corrected).total_cmp(&l2(b, Way::Corrected)));
     let Some(state) = order.get(order.len() / 2) else {
-        return Ok(RgbImage::new(1, 1));
+        return Ok(Canvas::new(1, 1));
     };
     let by_formula = work.formula_pa(&state.means, gain);
     work.judge(&by_formula)?;

@@ -7,7 +7,7 @@ use papilla_engine::Session;
 use papilla_model_export::ExportError;
 use papilla_model_export::dataset::Dataset;
 use papilla_model_export::metrics::SampleMetrics;
-use papilla_progress::processor::thread_s;
+use papilla_processor::thread_s;
 use papilla_proto::effects::{Actuator, ActuatorInput, Drive, Layout, Place};
 use papilla_proto::{HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX, Problem};
 use papilla_session_effects::{Effects, Finger};

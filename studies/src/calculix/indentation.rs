@@ -11,7 +11,7 @@ use papilla_fem::mesh::Mesh;
 use papilla_fem::solve::{Loading, MovingIndenter, Options, Problem, Solver};
 use papilla_fingertip::simulation::record::relative_l2;
 use papilla_fingertip::tissue::Tissue;
-use papilla_progress::processor;
+use papilla_processor::thread_s;
 use papilla_sdf::SignedDistance;
 use papilla_validation::verify::CaseError;
 use std::sync::Arc;
@@ -167,7 +167,7 @@ impl Pressing<'_> {
 
     fn solver(self) -> Result<Answer, CaseError> {
         let along = self.pressing_axis();
-        let begun_s = processor::thread_s();
+        let begun_s = thread_s();
         let problem = Problem::new(self.mesh, laws(&self.cards)?, self.fixed, Some(self.contact))?;
         let RigidIndenter { start, path, .. } = self.indenter;
         let along_path = MovingIndenter::along(self.shape, start, path);
@@ -179,7 +179,7 @@ impl Pressing<'_> {
         }
         let u = solver.displacement_mm();
         let sed_mpa = sed_mpa(&problem, self.types, u)?;
-        let cpu_s = Some(processor::thread_s() - begun_s);
+        let cpu_s = Some(thread_s() - begun_s);
         let force = solver.balance().contact_force_n;
         let force_n = (0..3).map(|i| force[i] * along[i]).sum();
         let mut displacement_mm = vec![[0.0; 3]; u.len()];

@@ -4,7 +4,7 @@ use papilla_calculix::ElementTypes;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::{Block, FaceKind, Mesh, Surface};
 use papilla_fingertip::tissue::Tissue;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::collections::HashSet;
 
 /// A face between two tissues, seen from the first one's element.

@@ -1,17 +1,17 @@
 //! What each effect of a scene changes and what it costs: the scene solved with each
 //! effect switched off, or on, in turn.
 
+use papilla_atlas::PA_PER_MPA;
 use papilla_fem::solve::{Effort, Options};
 use papilla_fingertip::forecast::census;
 use papilla_fingertip::scene::effects::EFFECTS;
 use papilla_fingertip::scene::{EffectName, Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
-use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::maps::{FingerMaps, MapError};
 use papilla_fingertip::simulation::record::relative_l2;
-use papilla_progress::processor;
-use papilla_solid::tensor::norm;
+use papilla_processor::thread_s;
+use papilla_vector::norm;
 use serde::Serialize;
 
 /// Why a study cannot be made.
@@ -188,17 +188,17 @@ fn switch(scene: &Scene, effect: &'static str, named: bool) -> (Scene, Vec<&'sta
 }
 
 fn solve(scene: &Scene) -> Result<Solved, EffectStudyError> {
-    let begun_s = processor::thread_s();
+    let begun_s = thread_s();
     let mut setup = Simulation::new(scene)?;
     let maps = FingerMaps::new(&mut setup.body)?;
     let mut solver = setup.body.solver(Options::default())?;
-    let ready_s = processor::thread_s();
+    let ready_s = thread_s();
     let (mut effort, mut last) = (Effort::default(), None);
     setup.body.press(&mut solver, &setup.approach, &setup.drive, 1, &mut |_, record, report| {
         effort = effort.plus(&report.effort);
         last = Some(record.clone());
     })?;
-    let solve_s = processor::thread_s() - ready_s;
+    let solve_s = thread_s() - ready_s;
     let last = last.ok_or(SimulationError::Empty)?;
     let fields = match &maps {
         Some(maps) => maps.pressure_and_sed(&last)?,

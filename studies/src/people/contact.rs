@@ -2,7 +2,7 @@
 
 use papilla_fem::solve::Solver;
 use papilla_fingertip::simulation::body::Body;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use serde::{Deserialize, Serialize};
 
 /// What is read of a contact.

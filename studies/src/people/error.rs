@@ -3,7 +3,7 @@
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
-use papilla_validation::part::PartError;
+use papilla_validation::stored::StoredError;
 use std::path::PathBuf;
 
 /// Why a comparison stopped.
@@ -81,7 +81,7 @@ pub enum PeopleError {
     },
     /// What an earlier run stored is of no use.
     #[error(transparent)]
-    Part(#[from] PartError),
+    Stored(#[from] StoredError),
     /// A file cannot be read or written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -230,7 +230,7 @@ fn radius_mm(finger: &FingertipShape, at: [f64; 3]) -> f64 {
     let along = |d: [f64; 3]| {
         let out: f64 = (0..3).map(|i| d[i] * normal[i]).sum();
         let t: [f64; 3] = std::array::from_fn(|i| d[i] - out * normal[i]);
-        let size = papilla_solid::tensor::norm(t);
+        let size = papilla_vector::norm(t);
         t.map(|v| v / size)
     };
     let axes = [along([1.0, 0.0, 0.0]), along([0.0, 1.0, 0.0])];

@@ -1,6 +1,7 @@
 //! What a receptor feels: strain, stress and strain energy at a depth below the skin.
 
 use crate::people::PeopleError;
+use papilla_atlas::PA_PER_MPA;
 use papilla_fem::element::{HistoryVariables, Inverted};
 use papilla_fem::mesh::probe::Probe;
 use papilla_fem::mesh::reader::SurfaceReader;
@@ -8,7 +9,6 @@ use papilla_fem::mesh::sample::{Deformed, Sample};
 use papilla_fem::solve::Solver;
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::simulation::body::Body;
-use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_solid::tensor::{Kinematics, Mat3, eigen, trace};
 use serde::{Deserialize, Serialize};

@@ -18,8 +18,8 @@ use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::Drive;
 use papilla_fingertip::simulation::laws::solids;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_progress::processor;
-use papilla_validation::part;
+use papilla_processor::thread_s;
+use papilla_validation::stored;
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -135,9 +135,10 @@ impl Solution {
         folder: &Path,
     ) -> Result<Self, PeopleError> {
         let scene = press.scene(course.cells, course.depths_mm.last().copied().unwrap_or(1.0));
-        let fingerprint = part::fingerprint(&(&scene, course, READING, env!("CARGO_PKG_VERSION")))?;
+        let fingerprint =
+            stored::fingerprint(&(&scene, course, READING, env!("CARGO_PKG_VERSION")))?;
         let path = folder.join(format!("{}-{}.json", press.name, &fingerprint[..8]));
-        let found: Option<Self> = part::read_json(&path)?;
+        let found: Option<Self> = stored::read_json(&path)?;
         if let Some(found) = found.filter(|f| f.fingerprint == fingerprint) {
             return Ok(found);
         }
@@ -150,7 +151,7 @@ impl Solution {
     fn solve(&mut self, press: &Press, course: &Course, scene: &Scene) -> Result<(), PeopleError> {
         let failed =
             |e: SimulationError| PeopleError::Press { press: press.name.clone(), source: e.into() };
-        let begun_s = processor::thread_s();
+        let begun_s = thread_s();
         let finger = &press.subject.shape;
         let touch = press.first_touch(&course.depths_mm)?;
         let mut body = body(scene, finger, course.cells, &touch).map_err(failed)?;
@@ -199,7 +200,7 @@ impl Solution {
             Ok(()) | Err(SimulationError::Halted) => broken,
             Err(e) => Some(e.to_string()),
         };
-        self.solve_s = processor::thread_s() - begun_s;
+        self.solve_s = thread_s() - begun_s;
         Ok(())
     }
 

@@ -14,9 +14,10 @@ use papilla_fingertip::scene::{EffectName, Friction, PathPoint, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::drive::Visit;
-use papilla_progress::processor;
-use papilla_solid::tensor::{Kinematics, norm};
-use papilla_validation::part;
+use papilla_processor::thread_s;
+use papilla_solid::tensor::Kinematics;
+use papilla_validation::stored;
+use papilla_vector::norm;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -60,9 +61,9 @@ impl Tangential {
         };
         let depth_mm = way.path.depth_at(force_n).ok_or(wanted)?;
         let scene = scene(&press, depth_mm, shift_mm, friction);
-        let fingerprint = part::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
+        let fingerprint = stored::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
         let path = folder.join(format!("tangential-{}.json", &fingerprint[..8]));
-        let found: Option<Self> = part::read_json(&path)?;
+        let found: Option<Self> = stored::read_json(&path)?;
         if let Some(found) = found.filter(|f| f.fingerprint == fingerprint) {
             return Ok(found);
         }
@@ -85,7 +86,7 @@ fn scene(press: &Press, depth_mm: f64, shift_mm: f64, friction: f64) -> Scene {
 
 fn solved(scene: &Scene, press: &str) -> Result<Tangential, PeopleError> {
     let failed = |e: SimulationError| PeopleError::Press { press: press.into(), source: e.into() };
-    let begun_s = processor::thread_s();
+    let begun_s = thread_s();
     let setup = Simulation::new(scene).map_err(failed)?;
     let skin = Skin::new(&setup)
         .map_err(|e| PeopleError::Receptor { press: press.into(), why: e.to_string() })?;
@@ -105,7 +106,7 @@ fn solved(scene: &Scene, press: &str) -> Result<Tangential, PeopleError> {
     };
     let pressed_so = setup.body.press(&mut solver, &setup.approach, &setup.drive, 1, visit);
     pressed_so.map_err(failed)?;
-    Ok(Tangential { solve_s: processor::thread_s() - begun_s, ..found })
+    Ok(Tangential { solve_s: thread_s() - begun_s, ..found })
 }
 
 /// Two edges of the skin at a place, deformed from two unit vectors across each other.

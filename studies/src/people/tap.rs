@@ -7,8 +7,8 @@ use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::{EffectName, Geometry, PathPoint, Scene, TissueTable};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
-use papilla_progress::processor;
-use papilla_validation::part;
+use papilla_processor::thread_s;
+use papilla_validation::stored;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -39,9 +39,9 @@ impl Tap {
         folder: &Path,
     ) -> Result<Self, PeopleError> {
         let scene = scene(subject, relaxes, depth_mm, time_s);
-        let fingerprint = part::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
+        let fingerprint = stored::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
         let path = folder.join(format!("tap-{}.json", &fingerprint[..8]));
-        let found: Option<Self> = part::read_json(&path)?;
+        let found: Option<Self> = stored::read_json(&path)?;
         if let Some(found) = found.filter(|f| f.fingerprint == fingerprint) {
             return Ok(found);
         }
@@ -73,7 +73,7 @@ fn scene(subject: &Subject, relaxes: bool, depth_mm: f64, time_s: f64) -> Scene 
 }
 
 fn solved(scene: &Scene) -> Result<Tap, SimulationError> {
-    let begun_s = processor::thread_s();
+    let begun_s = thread_s();
     let setup = Simulation::new(scene)?;
     let mut solver = setup.body.solver(Options::default())?;
     let (mut most_mj, mut last_mj, mut force_n_max) = (0.0f64, 0.0, 0.0f64);
@@ -83,7 +83,7 @@ fn solved(scene: &Scene) -> Result<Tap, SimulationError> {
         force_n_max = force_n_max.max(record.force_n[2]);
     })?;
     let lost_percent = 100.0 * last_mj / most_mj;
-    let solve_s = processor::thread_s() - begun_s;
+    let solve_s = thread_s() - begun_s;
     Ok(Tap { lost_percent, force_n_max, solve_s, ..Tap::default() })
 }
 

@@ -1,11 +1,11 @@
 //! SED along the lines of the section that the paper's figures show.
 
 use super::WedgeError;
+use papilla_atlas::PA_PER_MPA;
 use papilla_fem::mesh::probe::{Probe, line};
 use papilla_fem::solve::Solver;
 use papilla_fingertip::geometry::section::SectionShape;
 use papilla_fingertip::simulation::body::Body;
-use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::tissue::Tissue;
 use papilla_solid::tensor::Kinematics;
 

@@ -141,33 +141,18 @@ fn card_of(onnx: &[u8]) -> Card {
     let model = papilla_engine::load(onnx, None).unwrap();
     let info = model.info();
     let worst = Spread { median: 1.0, p95: 1.0 };
-    Card {
-        format: papilla_engine::MODEL_FORMAT,
-        name: info.name.clone(),
-        onnx_sha256: info.onnx_sha256.clone(),
-        bytes: info.bytes,
-        atlas_hash: info.atlas_hash.clone(),
-        effects: info.effects.clone(),
-        network: info.network.clone(),
-        pressure_range_pa: [0.0, info.pressure_max_pa],
-        input_statistics_max: None,
-        response_max_per_mpa: None,
-        sed_max_j_per_m3: info.sed_max_j_per_m3,
-        dataset_sha256: info.dataset_sha256.clone(),
-        training: info.training.clone(),
-        metrics: Metrics {
-            dataset_sha256: None,
-            split: "none".to_owned(),
-            samples: 0,
-            relative_l2: worst,
-            far_field_relative_l2: None,
-            peak_error: worst,
-            peak_distance_mm: None,
-            nail_base_error: None,
-            total_energy_error: worst,
-            ssim: Similarity { median: 0.0, p5: 0.0 },
-        },
-        latency_ms: Latency { backend: info.backend.clone(), threads: 1, p50: 1.0, p99: 1.0 },
-        onnxruntime_difference_max: None,
-    }
+    let metrics = Metrics {
+        dataset_sha256: None,
+        split: "none".to_owned(),
+        samples: 0,
+        relative_l2: worst,
+        far_field_relative_l2: None,
+        peak_error: worst,
+        peak_distance_mm: None,
+        nail_base_error: None,
+        total_energy_error: worst,
+        ssim: Similarity { median: 0.0, p5: 0.0 },
+    };
+    let latency_ms = Latency { backend: info.backend.clone(), threads: 1, p50: 1.0, p99: 1.0 };
+    Card::of(info, metrics, latency_ms)
 }

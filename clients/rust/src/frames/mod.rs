@@ -15,7 +15,7 @@
 //! ```
 
 use papilla_proto::contact::{Pose, Touch};
-use papilla_sdf::vector::{cross, dot, minus};
+use papilla_vector::{cross, dot, minus};
 
 type Three = [f64; 3];
 /// x y z w.

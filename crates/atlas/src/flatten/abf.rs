@@ -14,9 +14,9 @@
 //! triangles, leaving two unknowns per interior vertex) is exact.
 
 use super::FlattenError;
-use super::angles::dot;
 use super::disc::Disc;
 use super::sparse::{Cholesky, Entry};
+use papilla_vector::dot;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 

@@ -1,6 +1,7 @@
 //! Corner angles of triangles in space.
 
 use super::FlattenError;
+use papilla_vector::{cross, dot, minus, norm};
 
 /// Smallest angle that still counts as a triangle, rad.
 const ANGLE_RAD_MIN: f64 = 1e-4;
@@ -25,7 +26,7 @@ pub(super) fn corner_angles(
 }
 
 fn angle(at: [f64; 3], to: [f64; 3], other: [f64; 3]) -> f64 {
-    let (a, b) = (difference(to, at), difference(other, at));
+    let (a, b) = (minus(to, at), minus(other, at));
     norm(cross(a, b)).atan2(dot(a, b))
 }
 
@@ -36,26 +37,10 @@ pub(super) fn area(p: [[f64; 3]; 3]) -> f64 {
 
 /// Normal of a triangle in space, as long as twice its area.
 pub(super) fn doubled_area_vector(p: [[f64; 3]; 3]) -> [f64; 3] {
-    cross(difference(p[1], p[0]), difference(p[2], p[0]))
+    cross(minus(p[1], p[0]), minus(p[2], p[0]))
 }
 
 /// Signed area of a triangle in the plane, positive counter-clockwise.
 pub(super) fn plane_area([a, b, c]: [[f64; 2]; 3]) -> f64 {
     0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-}
-
-pub(super) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }

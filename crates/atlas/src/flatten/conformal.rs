@@ -8,9 +8,9 @@
 //! flattening give its reconstruction, where the energy comes out as zero.
 
 use super::FlattenError;
-use super::angles::{difference, norm};
 use super::disc::Disc;
 use super::sparse::{Cholesky, Entry, Factor};
+use papilla_vector::{minus, norm};
 
 /// Corrections after the first solve: the normal equations square the condition number,
 /// and these win the lost digits back.
@@ -115,7 +115,7 @@ fn farthest_pair(disc: &Disc, positions: &[[f64; 3]]) -> (usize, usize, f64) {
     let mut best = (0, 0, 0.0);
     for (i, &a) in disc.boundary.iter().enumerate() {
         for &b in &disc.boundary[i + 1..] {
-            let distance = norm(difference(positions[a], positions[b]));
+            let distance = norm(minus(positions[a], positions[b]));
             if distance > best.2 {
                 best = (a, b, distance);
             }

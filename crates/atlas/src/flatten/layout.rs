@@ -1,8 +1,9 @@
 //! Two flattened patches in one image.
 
-use super::angles::{area, difference, doubled_area_vector};
+use super::angles::{area, doubled_area_vector};
 use super::{BuildAtlasError, Convergence, Distortion, Flattening, Method, flatten};
 use crate::{Atlas, MAP_SIDE_PX, Patch, PatchVertices, Raster};
+use papilla_vector::minus;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -148,7 +149,7 @@ fn wound_outward(skin: &[[f64; 3]], interface: &[[f64; 3]], triangles: &[[u32; 3
     let volume = |corners: &[u32; 3]| {
         let corners = corners.map(|vertex| vertex as usize);
         let normal = doubled_area_vector(corners.map(|vertex| skin[vertex]));
-        let up = corners.map(|vertex| difference(skin[vertex], interface[vertex]));
+        let up = corners.map(|vertex| minus(skin[vertex], interface[vertex]));
         (0..3).map(|k| normal[k] * (up[0][k] + up[1][k] + up[2][k])).sum::<f64>()
     };
     let outward = triangles.iter().map(volume).sum::<f64>() >= 0.0;

@@ -49,7 +49,6 @@ mod spacing;
 mod turns;
 mod window;
 
-use crate::PA_PER_MPA;
 use crate::answer::{Aside, Contact, Effort, Person};
 use crate::bounded::BoundedSolver;
 use crate::error::ContactError;
@@ -62,6 +61,7 @@ use crate::solver::{Solver, Until};
 use careful::Careful;
 use convolution::Convolution;
 use papilla_atlas::MAP_LEN;
+use papilla_atlas::PA_PER_MPA;
 use rubbing::Rubbing;
 use shown::Shown;
 use std::sync::Arc;

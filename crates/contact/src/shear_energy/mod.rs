@@ -13,11 +13,12 @@
 //! with the added part. The map is computed on cells of 2 x 2 pixels (.27 mm; the vertices that
 //! carry traction are .7 mm apart), as one period of waves.
 
-use crate::PA_PER_MPA;
 use crate::interface::{InterfaceResponse, Response};
 use crate::model::ContactModel;
+use papilla_atlas::PA_PER_MPA;
 use papilla_atlas::{Atlas, MAP_LEN, Patch, Raster};
 use papilla_fft::{Grid, Line, Scratch, Wave};
+use papilla_vector::norm;
 use std::f64::consts::TAU;
 use std::fmt;
 use std::sync::Arc;
@@ -103,7 +104,7 @@ fn tangents(model: &ContactModel, uv_px: &[[f32; 2]]) -> Vec<[[f32; 3]; 2]> {
         }
     }
     let unit = |v: [f64; 3]| {
-        let size = v.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+        let size = norm(v).max(f64::MIN_POSITIVE);
         v.map(|x| x / size)
     };
     let pair = |[along, down]: [[f64; 3]; 2]| {

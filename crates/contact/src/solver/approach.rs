@@ -4,6 +4,7 @@ use super::{BACK_MAX_MM, STEP_MM, STEPS_MAX, Solver, Until};
 use crate::answer::Effort;
 use crate::objects::View;
 use crate::patch::Patch;
+use papilla_vector::norm;
 
 impl Solver {
     /// Brings objects in by steps that lie too deep in the displaced skin.
@@ -47,7 +48,7 @@ impl Solver {
                 sum[i] += f64::from(normal[i]) * f64::from((-gap).max(0.0));
             }
         }
-        let size = sum.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let size = norm(sum);
         (size > 0.0).then(|| sum.map(|v| v / size))
     }
 }

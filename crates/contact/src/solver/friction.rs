@@ -12,6 +12,7 @@ use crate::discs::{DiscSolver, Tangential, size, steps, to_disc};
 use crate::model::ContactModel;
 use crate::objects::View;
 use crate::patch::{Patch, Slots};
+use papilla_vector::single::{cross, dot};
 
 /// Slip against a force below its bound that is accepted, reference mm.
 const VIOLATION_MM: f32 = 2e-5;
@@ -282,18 +283,13 @@ impl Friction {
     }
 }
 
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// Puts the tangent nearest to `toward` at a slot, and the one across it.
 fn put(tangents: &mut Tangents, slot: usize, n: [f32; 3], toward: [f32; 3]) {
     let up = dot(n, toward);
     let flat: [f32; 3] = std::array::from_fn(|i| toward[i] - up * n[i]);
     let part = 1.0 / dot(flat, flat).sqrt().max(f32::MIN_POSITIVE);
     let t = flat.map(|v| part * v);
-    let across = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
-    for (tangent, value) in tangents.iter_mut().zip([t, across]) {
+    for (tangent, value) in tangents.iter_mut().zip([t, cross(n, t)]) {
         for (column, value) in tangent.iter_mut().zip(value) {
             column[slot] = value;
         }

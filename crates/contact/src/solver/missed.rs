@@ -4,9 +4,9 @@
 use super::Solver;
 use crate::answer::{Contact, Effort};
 use crate::back::Back;
-use crate::held::dot;
 use crate::object::Object;
 use crate::objects::{Things, View};
+use papilla_vector::dot;
 
 /// Deeper than this between vertices a body presses, reference mm. A ball of 2 mm lies less deep there
 /// when it meets the first vertex.

@@ -28,6 +28,7 @@ use candidates::Seen;
 pub use friction::Anchor;
 use friction::Friction;
 pub use memory::Memory;
+use papilla_vector::norm;
 pub use sides::Side;
 use sides::Sides;
 use std::sync::Arc;
@@ -546,7 +547,7 @@ impl Solver {
     /// Change of force for a small travel of the objects along it: forces of the points in contact
     /// that move all of them by the part of the travel along their normals.
     fn stiffness(&mut self, view: View<'_>, out: &mut Contact) -> Option<f64> {
-        let size = out.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let size = norm(out.force_n);
         if !(size > 0.0) {
             return None;
         }

@@ -10,7 +10,7 @@
 //! the bound, the bound to the new pressure and the plane to the new normal, until none changes:
 //! then Coulomb's law holds (Simo & Laursen 1992, made symmetric by the lagged bound).
 
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use serde::{Deserialize, Serialize};
 
 /// Tangential state of every contact point during a step.

@@ -1,7 +1,7 @@
 //! Points of a surface at which contact is found.
 
 use crate::mesh::Surface;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// Where on the surface contact is looked for; files know the rules as `nodes`, `faces` and
 /// `faces_finely`.

@@ -1,6 +1,6 @@
 //! Values on one triangulated surface read at points of another.
 
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// For each of some points the nearest point of a triangulated surface, as vertices and
 /// weights: values there are interpolated linearly in the triangle.

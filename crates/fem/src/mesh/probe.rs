@@ -7,7 +7,7 @@ use super::sample::{Deformed, Sample};
 use super::{Mesh, Region};
 use crate::element::geometry::jacobian;
 use crate::element::{ElementKind, Inverted};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::collections::BTreeMap;
 
 /// Points of a mesh at which fields are evaluated.

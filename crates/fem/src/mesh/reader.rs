@@ -1,8 +1,7 @@
 //! Nodal values of a surface read anywhere on it, with the shape functions of its faces.
 
 use super::{Mesh, Surface};
-use papilla_sdf::vector::dot;
-use papilla_solid::tensor::norm;
+use papilla_vector::{dot, norm};
 
 /// For each of some points the face of a surface that is nearest, and the shape functions there.
 #[derive(Clone, Debug)]

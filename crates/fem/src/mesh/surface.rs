@@ -7,7 +7,7 @@
 use crate::element::ElementKind;
 use crate::element::reference::GAUSS_3;
 use crate::element::shape::{hat_1d, linear_1d, quadratic_1d};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// Kind of face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use super::evaluate::Evaluation;
 use super::loading::Loading;
 use super::problem::Problem;
 use crate::contact::FrictionTrial;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// Sets bound and tangent plane of every point from its normal multiplier and its
 /// place at `u`. The bound goes the share `relax` of its way: large coefficients

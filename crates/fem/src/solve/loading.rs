@@ -3,7 +3,7 @@
 use super::pressure::SurfacePressure;
 use crate::contact::ContactRule;
 use papilla_sdf::{Distance, Placement, SignedDistance};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::sync::Arc;
 
 /// An indenter that moves along a path without turning.

@@ -8,6 +8,7 @@
 use super::problem::Problem;
 use crate::linear::SymmetricMatrix;
 use crate::mesh::Mesh;
+use papilla_vector::cross;
 use std::collections::HashMap;
 
 /// Two Gauss points and weights on `[0, 1]`.
@@ -61,13 +62,6 @@ pub enum SurfacePressureError {
     /// A face belongs to no element.
     #[error("a face of surface '{0}' is no side of an element")]
     Loose(String),
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j] * b[k] - a[k] * b[j]
-    })
 }
 
 impl SurfacePressure {

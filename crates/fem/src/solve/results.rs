@@ -188,7 +188,7 @@ impl<'a> Solver<'a> {
         }
         let rule = surface.kind.quadrature();
         surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, area| {
-            let area = papilla_solid::tensor::norm(area);
+            let area = papilla_vector::norm(area);
             for (&n, v) in face.iter().zip(value) {
                 for i in 0..3 {
                     total[i] += v * area * traction[n as usize][i];

@@ -9,7 +9,7 @@ use papilla_fem::linear::{Direct, DofMap, SymbolicSystem, SymmetricMatrix};
 use papilla_fem::mesh::Surface;
 use papilla_fem::solve::evaluate::{Evaluation, Trial, evaluate_body};
 use papilla_fem::solve::{Loading, Problem};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// Right-hand sides solved at a time: the factor is read once for all of them.
 const COLUMNS: usize = 48;

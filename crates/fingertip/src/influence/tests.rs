@@ -3,9 +3,9 @@
 use super::*;
 use crate::scene::Pose;
 use crate::simulation::drive::{Approach, Drive};
-use crate::simulation::fields::PA_PER_MPA;
 use crate::simulation::record::{IncrementRecord, relative_l2};
 use crate::tissue::Tissue;
+use papilla_atlas::PA_PER_MPA;
 use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::solve::{Loading, Options};
 use std::collections::HashMap;

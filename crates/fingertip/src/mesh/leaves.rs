@@ -8,7 +8,7 @@
 
 use super::half_cube::{GridSize, SIDES};
 use crate::geometry::fingertip::{FingertipShape, SurfaceParameter};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// Times that a cell can be halved along each of its sides.

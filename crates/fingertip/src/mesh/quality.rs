@@ -2,6 +2,7 @@
 
 use crate::tissue::Tissue;
 use papilla_fem::mesh::Mesh;
+use papilla_vector::{cross, dot, norm};
 
 /// Worst shapes among the elements of one tissue.
 #[derive(Clone, Copy, Debug)]
@@ -28,14 +29,14 @@ pub(super) fn of(mesh: &Mesh, tissue: Tissue) -> Quality {
             let columns = |xi| columns(mesh, block.kind, block.element(e), xi);
             for a in 0..block.kind.nodes() {
                 let c = columns(block.kind.node_xi(a));
-                let scaled = determinant(&c) / c.iter().map(|v| length(*v)).product::<f64>();
+                let scaled = determinant(&c) / c.iter().map(|v| norm(*v)).product::<f64>();
                 // NaN is worst of all.
                 if !(scaled >= quality.scaled_jacobian_min) {
                     quality.scaled_jacobian_min = scaled;
                     quality.worst_node = block.element(e)[a];
                 }
             }
-            let axes = columns([0.0; 3]).map(length);
+            let axes = columns([0.0; 3]).map(norm);
             let longest = axes.into_iter().fold(0.0, f64::max);
             let shortest = axes.into_iter().fold(f64::INFINITY, f64::min);
             quality.aspect_max = quality.aspect_max.max(longest / shortest);
@@ -60,15 +61,9 @@ fn columns(
     })
 }
 
-fn length(v: [f64; 3]) -> f64 {
-    papilla_solid::tensor::norm(v)
-}
-
 fn determinant(c: &[[f64; 3]; 3]) -> f64 {
-    let [a, b, d] = c;
-    a[0] * (b[1] * d[2] - b[2] * d[1])
-        + a[1] * (b[2] * d[0] - b[0] * d[2])
-        + a[2] * (b[0] * d[1] - b[1] * d[0])
+    let [a, b, d] = *c;
+    dot(a, cross(b, d))
 }
 
 #[test]

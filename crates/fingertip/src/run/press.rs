@@ -8,7 +8,7 @@ use crate::simulation::record::IncrementRecord;
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Solver, StepReport};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// A stored equilibrium.
 #[derive(Clone, Debug)]

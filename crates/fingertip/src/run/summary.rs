@@ -1,9 +1,9 @@
 //! What is told of a stored equilibrium.
 
 use super::Pressed;
-use crate::simulation::fields::PA_PER_MPA;
 use crate::simulation::maps::FingerMaps;
 use crate::simulation::sample;
+use papilla_atlas::PA_PER_MPA;
 use papilla_dataset::Checks;
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::Effort;

@@ -1,7 +1,8 @@
 //! A whole body at one equilibrium, for looking at.
 
 use crate::simulation::body::Body;
-use crate::simulation::fields::{ElementFields, PA_PER_MPA};
+use crate::simulation::fields::ElementFields;
+use papilla_atlas::PA_PER_MPA;
 use papilla_fem::mesh::Mesh;
 use papilla_fem::solve::Solver;
 use papilla_output::OutputError;

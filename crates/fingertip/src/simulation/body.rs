@@ -24,8 +24,8 @@ use papilla_fem::solve::{
     SurfacePressure, SurfacePressureError,
 };
 use papilla_sdf::Placement;
-use papilla_sdf::vector::minus;
-use papilla_solid::tensor::{norm, product};
+use papilla_solid::tensor::product;
+use papilla_vector::{minus, norm};
 use std::path::PathBuf;
 use std::sync::Arc;
 

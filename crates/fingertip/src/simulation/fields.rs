@@ -1,14 +1,12 @@
 //! Fields of a whole body at one equilibrium, for looking at.
 
 use super::body::Body;
+use papilla_atlas::PA_PER_MPA;
 use papilla_fem::element::extrapolate::weights as extrapolation;
 use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::element::{ConstitutiveModel, HistoryVariables};
 use papilla_fem::solve::Solver;
 use papilla_solid::tensor::{Kinematics, Mat3};
-
-/// Pa per MPa, and J/m3 per mJ/mm3.
-pub const PA_PER_MPA: f64 = 1e6;
 
 /// Components of a symmetric tensor in the order of the xx yy zz xy yz xz that VTK takes.
 pub type Symmetric = [f64; 6];

@@ -8,8 +8,7 @@
 use super::body::{Body, SimulationError};
 use papilla_fem::mesh::Surface;
 use papilla_fem::solve::Solver;
-use papilla_sdf::vector::dot;
-use papilla_solid::tensor::norm;
+use papilla_vector::{dot, norm, scaled_to_one};
 use std::collections::BTreeMap;
 
 /// Most of the contact force's normal part that may act along the skin. It is 0 in the limit of
@@ -63,11 +62,6 @@ impl Body {
     }
 }
 
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let size = norm(v);
-    if size > 0.0 { v.map(|c| c / size) } else { v }
-}
-
 /// Mean normal of the faces around each node at the positions `x`; zero off the surface.
 fn mean_normals(surface: &Surface, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let mut sum = vec![[0.0; 3]; x.len()];
@@ -78,7 +72,7 @@ fn mean_normals(surface: &Surface, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
             }
         }
     });
-    sum.into_iter().map(unit).collect()
+    sum.into_iter().map(scaled_to_one).collect()
 }
 
 /// Nodes at which the undeformed skin has one normal: neither on its rim nor on an edge of it.
@@ -86,7 +80,7 @@ fn smooth_nodes(surface: &Surface, x: &[[f64; 3]]) -> Vec<bool> {
     let mean = mean_normals(surface, x);
     let mut smooth = vec![true; x.len()];
     surface.integrate(&surface.kind.quadrature(), &|n| x[n as usize], &mut |face, _, area| {
-        let own = unit(area);
+        let own = scaled_to_one(area);
         for &n in face {
             smooth[n as usize] &= dot(own, mean[n as usize]) >= SMOOTH_MIN;
         }

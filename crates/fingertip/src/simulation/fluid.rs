@@ -67,7 +67,7 @@ mod tests {
                           report: &papilla_fem::solve::StepReport| {
             println!("{} {:?} {:?}", record.checks.energy_vs_work, record.force_n, report.effort);
             let volume = problem.volume_mm3(solver.displacement_mm());
-            let force_n = papilla_solid::tensor::norm(record.force_n);
+            let force_n = papilla_vector::norm(record.force_n);
             found = Some(Pressed { lost: 1.0 - volume / at_rest, force_n, checks: record.checks });
         };
         setup.run(visit).unwrap();

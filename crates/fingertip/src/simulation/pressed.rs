@@ -2,17 +2,16 @@
 
 use super::body::{Body, Sides, SimulationError, Under};
 use super::drive::Watch;
-use super::fields::PA_PER_MPA;
 use super::record::IncrementRecord;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build, build_pressed};
+use papilla_atlas::PA_PER_MPA;
 use papilla_atlas::flatten::build_atlas;
 use papilla_atlas::{Atlas, MAP_SIDE_PX, Patch};
 use papilla_fem::solve::{
     Effort, Loading, Materials, SolveError, Solver, StepReport, SurfacePressure,
 };
-use papilla_sdf::vector::{dot, minus};
-use papilla_solid::tensor::norm;
+use papilla_vector::{dot, minus, norm};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;

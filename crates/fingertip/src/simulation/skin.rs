@@ -118,7 +118,7 @@ mod tests {
         let pressure = solver.pressure_mpa(surface);
         let slack = 5e-3 * 0.4 * pressure.iter().copied().fold(0.0, f64::max);
         for (&n, s) in nodes.iter().zip(&shear) {
-            let size = papilla_solid::tensor::norm(*s);
+            let size = papilla_vector::norm(*s);
             assert!(size <= 0.4 * pressure[n as usize] + slack, "{size}");
         }
     }

@@ -12,7 +12,7 @@ use crate::scene::{Plan, Pose, Scene, TissueTable};
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_sdf::IndenterSpec;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::path::Path;
 
 const BONE: Parts = Parts { bone: true, nail: false };

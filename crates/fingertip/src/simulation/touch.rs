@@ -10,7 +10,7 @@ use papilla_fem::contact::{ContactRule, ContactSurface};
 use papilla_fem::mesh::Mesh;
 use papilla_fem::solve::MovingIndenter;
 use papilla_sdf::{Placement, SignedDistance, first_touch_travel};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// Part of a face's width that may be in the indenter before a node touches: a ball as wide
 /// as four faces has a sixteenth, a knife comes to a half.

@@ -9,7 +9,7 @@
 //! their tangent planes.
 
 use super::{Distance, Placed, Placement, SignedDistance};
-use crate::vector::{along, cross, dot, minus, norm};
+use papilla_vector::{along, cross, dot, minus, norm};
 
 /// Bodies closer than this are one: there is no way in between, mm.
 pub(crate) const SEAM_MM: f64 = 1e-3;

@@ -4,9 +4,9 @@ use super::error::MeshError;
 use super::shells::{covered, lying_upon};
 use super::tree::Tree;
 use super::work::Work;
-use super::{Mesh, TRIANGLES_MAX, normal, scaled_to_one, square};
+use super::{Mesh, TRIANGLES_MAX, normal, square};
 use crate::rules::LENGTH_MAX_MM;
-use crate::vector::{cross, dot, minus};
+use papilla_vector::{cross, dot, minus, scaled_to_one};
 use std::collections::HashMap;
 
 /// Least height of a triangle over its longest edge.

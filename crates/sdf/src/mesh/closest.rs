@@ -1,6 +1,6 @@
 //! The point of a triangle that is nearest to another one.
 
-use crate::vector::{dot, minus};
+use papilla_vector::{dot, minus};
 
 /// What of a triangle is nearest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -20,9 +20,9 @@ pub use mend::Mended;
 
 use super::beneath::SEAM_MM;
 use super::{Distance, SignedDistance};
-use crate::vector::{cross, dot, minus};
 use check::Checked;
 use closest::{Feature, closest};
+use papilla_vector::{cross, dot, minus, norm, scaled_to_one};
 use serde::{Deserialize, Serialize};
 use tree::Tree;
 use winding::Winding;
@@ -283,11 +283,6 @@ fn add(sum: &mut [f64; 3], v: [f64; 3]) {
     }
 }
 
-fn scaled_to_one(v: [f64; 3]) -> [f64; 3] {
-    let size = square(v).sqrt();
-    if size > 0.0 { v.map(|c| c / size) } else { v }
-}
-
 /// Twice the area along the outward normal.
 fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
     cross(minus(b, a), minus(c, a))
@@ -296,7 +291,7 @@ fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
 /// Angle at the first corner.
 fn angle([a, b, c]: [[f64; 3]; 3]) -> f64 {
     let (u, v) = (minus(b, a), minus(c, a));
-    square(cross(u, v)).sqrt().atan2(dot(u, v))
+    norm(cross(u, v)).atan2(dot(u, v))
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 //! that are covered.
 
 use super::error::MeshError;
+use super::normal;
 use super::tree::Tree;
 use super::work::Work;
-use super::{normal, scaled_to_one};
 use crate::beneath::SEAM_MM;
-use crate::vector::{cross, dot, minus};
+use papilla_vector::{cross, dot, minus, scaled_to_one};
 
 /// Least cosine between normals of faces that lie upon each other.
 const PARALLEL: f64 = 1.0 - 1e-9;

@@ -5,7 +5,7 @@
 
 use super::tree::Tree;
 use super::{normal, square};
-use crate::vector::{along, cross, dot, minus, norm};
+use papilla_vector::{along, cross, dot, minus, norm};
 use std::f64::consts::PI;
 
 /// A box counts as far from so many of its radii on: the number is then some 1 % off.

@@ -1,6 +1,6 @@
 //! What keeps a study from being made.
 
-use crate::part::PartError;
+use crate::stored::StoredError;
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
@@ -34,7 +34,7 @@ pub enum ConvergenceError {
     },
     /// What an earlier run stored is of no use.
     #[error(transparent)]
-    Part(#[from] PartError),
+    Stored(#[from] StoredError),
     /// A file cannot be read or written.
     #[error(transparent)]
     Output(#[from] OutputError),

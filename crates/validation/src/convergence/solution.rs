@@ -2,8 +2,9 @@
 
 use super::target::Target;
 use super::{Case, ConvergenceError};
-use crate::part;
+use crate::stored;
 use ndarray::Ix2;
+use papilla_atlas::PA_PER_MPA;
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::mesh::reader::SurfaceReader;
 use papilla_fem::solve::{Options, Solver, StepReport};
@@ -11,13 +12,12 @@ use papilla_fingertip::mesh::named::MeshChoice;
 use papilla_fingertip::scene::{Geometry, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::{Body, SimulationError};
-use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_fingertip::simulation::sample::fault;
 use papilla_output::OutputError;
 use papilla_output::npz::{NpzArrays, NpzBuilder};
-use papilla_progress::processor;
-use papilla_solid::tensor::norm;
+use papilla_processor::thread_s;
+use papilla_vector::norm;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -61,10 +61,10 @@ impl Solution {
         folder: &Path,
     ) -> Result<Self, ConvergenceError> {
         let scene = scene(case, mesh, states, target);
-        let fingerprint = part::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
+        let fingerprint = stored::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
         let stem = folder.join(format!("{}-{}", case.name, mesh.name));
         let (arrays, record) = (stem.with_extension("npz"), stem.with_extension("json"));
-        let found: Option<Record> = part::read_json(&record)?;
+        let found: Option<Record> = stored::read_json(&record)?;
         if let Some(found) = found.filter(|found| found.fingerprint == fingerprint) {
             return Self::read(&arrays, found);
         }
@@ -78,15 +78,15 @@ impl Solution {
     }
 
     fn solve(&mut self, scene: &Scene, target: &Target) -> Result<(), SimulationError> {
-        let begun_s = processor::thread_s();
+        let begun_s = thread_s();
         let Simulation { mut body, approach, drive, .. } = Simulation::new(scene)?;
         body.first_touch = Some(target.contact.clone());
         body.read_at_nodes();
-        self.record.setup_s = processor::thread_s() - begun_s;
+        self.record.setup_s = thread_s() - begun_s;
         self.record.unknowns = body.problem.system.dofs.count;
         self.record.factor_entries = body.problem.system.factor_entries();
         let readers = Readers::new(&body, target);
-        let begun_s = processor::thread_s();
+        let begun_s = thread_s();
         let mut solver = body.solver(Options::default())?;
         let mut keep = |state: usize, _: &Solver<'_>, found: &IncrementRecord, _: &StepReport| {
             if state == 0 {
@@ -100,7 +100,7 @@ impl Solution {
         };
         let limit = BALANCE_RELATIVE_MAX;
         let pressed = body.press_balanced(&mut solver, &approach, &drive, limit, &mut keep).pressed;
-        self.record.solve_s = processor::thread_s() - begun_s;
+        self.record.solve_s = thread_s() - begun_s;
         pressed
     }
 

@@ -5,7 +5,7 @@ use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::mesh::grading::Contact;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_sdf::IndenterSpec;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// Half of the side of the square around the first touch that is read, mm.
 const HALF_MM: f64 = 7.0;

@@ -129,7 +129,7 @@ fn corner_first(body: &Body, drive: &Drive) -> Result<Line, CaseError> {
     let mirrored = {
         let [x, y, z] = right.record.force_n;
         let l = left.record.force_n;
-        papilla_solid::tensor::norm([l[0] - x, l[1] + y, l[2] - z]) / left.force_n()
+        papilla_vector::norm([l[0] - x, l[1] + y, l[2] - z]) / left.force_n()
     };
     let checks = vec![Check::vanishes(
         "force against its mirror image",

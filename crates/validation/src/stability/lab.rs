@@ -60,14 +60,13 @@ impl Pressed {
     }
 
     pub(super) fn force_n(&self) -> f64 {
-        papilla_solid::tensor::norm(self.record.force_n)
+        papilla_vector::norm(self.record.force_n)
     }
 
     /// Pressure and SED against those of another indentation of the same body.
     pub(super) fn same_as(&self, other: &Self, tolerance: f64, source: &'static str) -> Vec<Check> {
         let (a, b) = (&self.record, &other.record);
-        let force =
-            papilla_solid::tensor::norm(std::array::from_fn(|i| a.force_n[i] - b.force_n[i]));
+        let force = papilla_vector::norm(std::array::from_fn(|i| a.force_n[i] - b.force_n[i]));
         let row = |what: &str, value| Check::vanishes(what, value, tolerance, source);
         let mut rows = vec![row("force", force / other.force_n())];
         if !a.pressure_mpa.is_empty() {

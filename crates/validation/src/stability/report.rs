@@ -3,7 +3,7 @@
 use super::line::{comparison, first_line};
 use super::{CASES, End, Extent, Hardness, Line};
 use crate::csv::quoted;
-use papilla_progress::processor::today_here;
+use papilla_processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
 

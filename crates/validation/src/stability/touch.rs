@@ -29,7 +29,7 @@ fn block(motion: &str) -> String {
 
 /// Largest displacement of a node, mm.
 fn largest_mm(solver: &Solver<'_>) -> f64 {
-    solver.displacement_mm().iter().map(|u| papilla_solid::tensor::norm(*u)).fold(0.0, f64::max)
+    solver.displacement_mm().iter().map(|u| papilla_vector::norm(*u)).fold(0.0, f64::max)
 }
 
 /// Relative L2 difference of displacements.
@@ -158,7 +158,7 @@ fn from_gap(
     let loading = Loading { indenter: Some(indenter), ..Loading::default() };
     let (solver, report) = solve(&body.problem, loading, tight(), 1)?;
     let force = solver.balance().contact_force_n;
-    Ok((solver.displacement_mm().to_vec(), report, papilla_solid::tensor::norm(force)))
+    Ok((solver.displacement_mm().to_vec(), report, papilla_vector::norm(force)))
 }
 
 pub(super) fn gaps(_: &Suite) -> Result<Vec<Line>, CaseError> {

@@ -107,7 +107,7 @@ pub(crate) fn membrane(
     let end = &mesh.surfaces["x_max"];
     end.integrate(&end.kind.quadrature(), &|n| mesh.nodes[n as usize], &mut |face, value, area| {
         for (&node, v) in face.iter().zip(value) {
-            dead_n[node as usize][1] += v * papilla_solid::tensor::norm(area) / 16.0;
+            dead_n[node as usize][1] += v * papilla_vector::norm(area) / 16.0;
         }
     });
     let middle = |p: &[f64; 3]| p[0] > 47.999 && (p[1] - 52.0).abs() < 1e-6;

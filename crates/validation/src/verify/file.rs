@@ -48,7 +48,7 @@ fn press(folder: &Path, text: &str) -> Result<[f64; 3], CaseError> {
     let mut last = None;
     setup.body.press(&mut solver, &setup.approach, &setup.drive, 1, &mut |s, r, report| {
         let peak = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
-        last = Some([papilla_solid::tensor::norm(r.force_n), peak, report.stored_mj]);
+        last = Some([papilla_vector::norm(r.force_n), peak, report.stored_mj]);
     })?;
     last.ok_or_else(|| "no state was recorded".into())
 }

@@ -5,7 +5,7 @@ use super::{CaseError, Check, Context};
 use papilla_fem::element::ElementKind;
 use papilla_fem::solve::{Loading, MovingIndenter, Options, Problem};
 use papilla_sdf::{Placement, Sphere};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::sync::Arc;
 
 const SOURCE: &str = "Hertz (Johnson 1985, sec. 4.2)";

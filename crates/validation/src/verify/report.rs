@@ -2,7 +2,7 @@
 
 use super::{CASES, CaseError, Check};
 use crate::csv::quoted;
-use papilla_progress::processor::today_here;
+use papilla_processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
 use std::time::Instant;

@@ -9,7 +9,7 @@ use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::laws::solids;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// Depths on the coarse mesh, mm; the last is judged.
 const DEPTHS_MM: [f64; 3] = [0.25, 0.5, 1.0];

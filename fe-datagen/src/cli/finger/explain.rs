@@ -10,6 +10,7 @@ use papilla_fingertip::mesh::fingertip::check_elements;
 use papilla_fingertip::scene::Finger;
 use papilla_fingertip::scene::finger::{FIELDS, Source};
 use papilla_fingertip::tissue::Tissue;
+use papilla_vector::{minus, norm};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -85,10 +86,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let finger = Finger::read(&args.finger)?;
     let (shape, usual) = (&finger.shape, Finger::usual().shape);
     let bounds = shape.layers(SurfaceParameter::Body([0.0, -1.0], 0.0))?;
-    let below_pad_mm = std::array::from_fn(|k| {
-        let way: [f64; 3] = std::array::from_fn(|i| bounds[k + 1][i] - bounds[k][i]);
-        way.iter().map(|v| v * v).sum::<f64>().sqrt()
-    });
+    let below_pad_mm = std::array::from_fn(|k| norm(minus(bounds[k + 1], bounds[k])));
     let number = |f: &papilla_fingertip::scene::finger::Field| Number {
         key: f.dotted(),
         value: f.shown(shape),

@@ -158,7 +158,7 @@ fn human(s: &Summary, out: &Path) -> String {
     text +=
         "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   energy against work\n";
     for i in &s.increments {
-        let force = papilla_solid::tensor::norm(i.force_n);
+        let force = papilla_vector::norm(i.force_n);
         text += &format!(
             "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:19.2} %{}\n",
             i.depth_mm,

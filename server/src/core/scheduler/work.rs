@@ -9,8 +9,9 @@ use std::{
 
 use bytes::BytesMut;
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
-use papilla_engine::{EngineError, processor_time};
+use papilla_engine::EngineError;
 use papilla_metrics::{Metrics, Stage};
+use papilla_processor::thread_time;
 use papilla_proto::{
     ERROR_ESTIMATE_LEN, ErrorCode, ErrorEstimate, MapSummary, PressureRange, Problem, flags,
 };
@@ -80,7 +81,7 @@ impl Worker {
 
     /// Serves a slot. Returns what that cost, and whether another job has come meanwhile.
     fn take_turn(&mut self, slot: &Slot) -> (Spent, bool) {
-        let (begun, cpu_begun) = (Instant::now(), processor_time());
+        let (begun, cpu_begun) = (Instant::now(), thread_time());
         let mut spent = Spent { busy: Duration::ZERO, beside_network: None };
         let abandoned = slot.is_abandoned();
         let Some((mut job, mut recycler)) = slot.take() else { return (spent, false) };
@@ -93,7 +94,7 @@ impl Worker {
         // A frame that failed or was late counts against its account if it took long. If it was
         // short, that says nothing, since it was not rendered.
         let beside_network =
-            processor_time().saturating_sub(cpu_begun).saturating_sub(done.times.network);
+            thread_time().saturating_sub(cpu_begun).saturating_sub(done.times.network);
         if is_rendered || beside_network > LONG {
             spent.beside_network = Some(beside_network);
         }
@@ -221,11 +222,11 @@ impl Worker {
             meta.flags |= rendering.flags();
             return Ok(Outcome::Late(Stage::Inference));
         } else {
-            let cpu_begun = processor_time();
+            let cpu_begun = thread_time();
             rendering.infer(session).map_err(of_network("the inference failed"))?;
             // To a network that was trained on another finger every map is unfamiliar.
             meta.flags |= if tier.trained_on.is_some() { flags::UNFAMILIAR } else { 0 };
-            times.network = processor_time().saturating_sub(cpu_begun);
+            times.network = thread_time().saturating_sub(cpu_begun);
             times.infer = decoded.elapsed();
             tier.latency.learn(times.infer);
         }

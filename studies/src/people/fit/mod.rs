@@ -31,7 +31,7 @@ use objective::Data;
 use papilla_fingertip::scene::Finger;
 use papilla_fingertip::scene::finger::Source;
 use papilla_output::atomic;
-use papilla_progress::processor::today_here;
+use papilla_processor::today_here;
 use parameters::{Moved, Parameter, RELAXATION_TIMES_S, start, values};
 use profile::Told;
 use record::RecordedPress;

@@ -16,7 +16,7 @@ use crate::people::receptors::Stimulus;
 use crate::people::solution::Solution;
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_output::{OutputError, atomic};
-use papilla_progress::processor::today_here;
+use papilla_processor::today_here;
 use serde::Serialize;
 use std::path::Path;
 

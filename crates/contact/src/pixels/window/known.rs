@@ -6,6 +6,7 @@
 use crate::object::Object;
 use crate::objects::{Things, View};
 use papilla_sdf::{Placement, SignedDistance};
+use papilla_vector::norm;
 use std::sync::Weak;
 
 /// Way of a thing from which on all is asked anew: sums stay exact to a ten-thousandth of a pixel.
@@ -54,7 +55,7 @@ impl Known {
         let high: [f64; 3] = std::array::from_fn(|i| bound(i, f32::max, f32::NEG_INFINITY));
         Self {
             centre_mm: std::array::from_fn(|i| 0.5 * (low[i] + high[i])),
-            radius_mm: 0.5 * length(std::array::from_fn(|i| high[i] - low[i])),
+            radius_mm: 0.5 * norm(std::array::from_fn(|i| high[i] - low[i])),
             thing: None,
             way_mm: 0.0,
             gap_mm: vec![0.0; rest_mm.len()],
@@ -84,7 +85,7 @@ impl Known {
         let way_mm = from.as_ref().map_or(f64::INFINITY, |from| {
             let away = std::array::from_fn(|i| self.centre_mm[i] - origin_mm[i]);
             let by = std::array::from_fn(|i| origin_mm[i] - from.origin_mm[i]);
-            turned(from) * (length(away) + self.radius_mm) + length(by)
+            turned(from) * (norm(away) + self.radius_mm) + norm(by)
         });
         self.way_mm += way_mm;
         if !(self.way_mm < WAY_MAX_MM) {
@@ -115,8 +116,4 @@ impl Known {
     pub(super) fn note(&mut self, entry: usize, gap_mm: f64) {
         (self.gap_mm[entry], self.asked_mm[entry]) = (gap_mm as f32, self.way_mm as f32);
     }
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

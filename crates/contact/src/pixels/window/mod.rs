@@ -14,6 +14,7 @@ use crate::push::Push;
 use close::Close;
 use known::Known;
 use papilla_atlas::MAP_SIDE_PX;
+use papilla_vector::single::cross;
 
 /// Pixels of the map between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
@@ -308,8 +309,4 @@ impl Window {
             }
         }
     }
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

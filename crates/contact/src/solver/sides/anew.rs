@@ -3,7 +3,8 @@
 use super::look::{Asked, PASSED, Sweep, THROUGH};
 use super::trusted_mm;
 use crate::answer::Effort;
-use crate::held::{Front, dot};
+use crate::held::Front;
+use papilla_vector::dot;
 
 /// So many times as deep as is trusted, a body may have come from the side that is guessed.
 const FIRST: f64 = 3.0;

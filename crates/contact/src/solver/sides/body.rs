@@ -5,7 +5,8 @@ use super::depth::{BEHIND_MM, FACING};
 use super::look::{Asked, PASSED, Sweep};
 use super::{EXACT_MM, Side, Survey, trusted_mm, unit};
 use crate::answer::Effort;
-use crate::held::{Front, Held, dot};
+use crate::held::{Front, Held};
+use papilla_vector::dot;
 
 /// Farther from all of the finger than this no body lies in it, reference mm.
 const NEARBY_MM: f64 = 0.8;

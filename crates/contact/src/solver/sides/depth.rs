@@ -3,7 +3,8 @@
 use super::Survey;
 use super::look::{Asked, SLANT};
 use crate::answer::Effort;
-use crate::held::{Front, dot};
+use crate::held::Front;
+use papilla_vector::dot;
 
 /// Cosine between the skin's and a body's outward normals below which the nearest surface tells the
 /// depth.

@@ -1,7 +1,7 @@
 //! Force that falls while an object moves further in.
 
 use super::Sides;
-use crate::held::dot;
+use papilla_vector::dot;
 
 /// Fall of the force on a straight way in that is flagged, as part of it and N, and what is straight.
 const FADE: f64 = 0.05;

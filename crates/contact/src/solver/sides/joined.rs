@@ -7,8 +7,8 @@
 
 use super::{Frame, OBJECTS, Side};
 use crate::answer::Effort;
-use crate::held::dot;
 use crate::object::Object;
+use papilla_vector::dot;
 
 /// Objects closer than this are one, mm.
 const TOUCH_MM: f64 = 1e-3;

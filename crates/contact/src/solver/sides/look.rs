@@ -2,10 +2,11 @@
 
 use super::Side;
 use crate::answer::Effort;
-use crate::held::{Front, Held, dot};
+use crate::held::{Front, Held};
 use crate::model::ContactModel;
 use crate::object::Object;
 use crate::objects::View;
+use papilla_vector::dot;
 
 /// Cosine between the way in and a front's normal above which depth is taken along the normal.
 pub(super) const SLANT: f64 = 0.7;

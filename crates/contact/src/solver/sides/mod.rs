@@ -17,12 +17,13 @@ mod look;
 
 use super::candidates::Seen;
 use crate::answer::Effort;
-use crate::held::{Held, dot};
+use crate::held::Held;
 use crate::model::ContactModel;
 use crate::object::Object;
 use crate::objects::{Things, View};
 use joined::Joined;
 use look::Asked;
+use papilla_vector::{dot, norm};
 
 /// Depth that is trusted if a model does not say, reference mm.
 const TRUSTED_MM: f64 = 2.0;
@@ -301,6 +302,6 @@ fn trusted_mm(model: &ContactModel) -> f64 {
 }
 
 fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
-    let size = dot(v, v).sqrt();
+    let size = norm(v);
     (size > 1e-9).then(|| v.map(|x| x / size))
 }

@@ -251,7 +251,7 @@ impl Builder<'_> {
                 nodes.iter().zip(gradient).map(of).sum()
             })
         };
-        (0..kind.dimension()).map(|k| papilla_solid::tensor::norm(column(k))).collect()
+        (0..kind.dimension()).map(|k| papilla_vector::norm(column(k))).collect()
     }
 
     /// An element on the corners of another would count its material twice.

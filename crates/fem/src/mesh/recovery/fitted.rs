@@ -11,7 +11,7 @@ use super::{NoElement, Sample, SedRecovery, element_on_side, sorted};
 use crate::element::ElementKind;
 use crate::element::reference::GAUSS_2;
 use crate::mesh::{Mesh, Region};
-use papilla_sdf::vector::dot;
+use papilla_vector::dot;
 use std::collections::{BTreeSet, HashMap};
 
 /// Intervals at which a point's weight has fallen to 1/e.

@@ -154,7 +154,7 @@ fn faces(mesh: &Mesh, surface: &Surface) -> Vec<(Vec<u32>, usize, f64)> {
     let mut faces: Vec<_> = surface.faces().map(|f| (f.to_vec(), corners, 0.0)).collect();
     let mut visit = 0;
     surface.integrate(&rule, &|n| mesh.nodes[n as usize], &mut |_, _, normal| {
-        faces[visit / rule.len()].2 += papilla_solid::tensor::norm(normal);
+        faces[visit / rule.len()].2 += papilla_vector::norm(normal);
         visit += 1;
     });
     faces

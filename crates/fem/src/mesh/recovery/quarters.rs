@@ -10,7 +10,7 @@ use super::{NoElement, Sample, SedRecovery, element_on_side, sorted};
 use crate::element::ElementKind;
 use crate::mesh::surface::side_nodes;
 use crate::mesh::{Mesh, Region};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::collections::HashMap;
 
 impl SedRecovery {

@@ -7,6 +7,7 @@
 use super::middle;
 use crate::linear::eigen;
 use crate::mesh::Mesh;
+use papilla_vector::{cross, norm};
 use std::fmt;
 
 /// A rigid motion that nothing holds.
@@ -45,7 +46,7 @@ fn direction(d: [f64; 3]) -> String {
 pub(super) fn free_modes(mesh: &Mesh, nodes: &[usize], fixed: &[bool]) -> Vec<FreeMode> {
     let centre = middle(mesh, nodes);
     let arm = |n: usize| -> [f64; 3] { std::array::from_fn(|i| mesh.nodes[n][i] - centre[i]) };
-    let size = nodes.iter().map(|&n| papilla_solid::tensor::norm(arm(n))).fold(0.0, f64::max);
+    let size = nodes.iter().map(|&n| papilla_vector::norm(arm(n))).fold(0.0, f64::max);
     let scale = if size > 0.0 { size } else { 1.0 };
     let mut gram = [[0.0; 6]; 6];
     let mut count = 0.0;
@@ -74,14 +75,13 @@ pub(super) fn free_modes(mesh: &Mesh, nodes: &[usize], fixed: &[bool]) -> Vec<Fr
 
 /// The motion of translation `t` and rotation `w` about `centre`.
 fn mode(t: [f64; 3], w: [f64; 3], centre: [f64; 3]) -> FreeMode {
-    let norm = papilla_solid::tensor::norm;
     let (slide, turn) = (norm(t), norm(w));
     if turn <= 1e-9 * slide {
         return FreeMode::Slide(t.map(|v| v / slide));
     }
     // The point of the axis next to the centre: w x t / |w|^2.
-    let cross = [w[1] * t[2] - w[2] * t[1], w[2] * t[0] - w[0] * t[2], w[0] * t[1] - w[1] * t[0]];
-    let through = std::array::from_fn(|i| centre[i] + cross[i] / (turn * turn) + 0.0);
+    let across = cross(w, t);
+    let through = std::array::from_fn(|i| centre[i] + across[i] / (turn * turn) + 0.0);
     FreeMode::Turn(w.map(|v| v / turn), through)
 }
 

@@ -21,7 +21,7 @@ pub use layer_map::{LayerMap, LayerMapError};
 pub use offset::{SkinOffset, SkinOffsetError};
 
 use check::GAP_MIN_MM;
-use papilla_solid::tensor::norm;
+use papilla_vector::{cross, norm};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -363,13 +363,6 @@ pub(crate) fn tangents(n: [f64; 3]) -> [[f64; 3]; 2] {
     [u, cross(n, u)]
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j] * b[k] - a[k] * b[j]
-    })
-}
-
 /// Angle of a section direction from the palmar side, rad, in `(-pi, pi]`.
 #[must_use]
 pub fn azimuth_from_palmar(d: [f64; 2]) -> f64 {
@@ -439,7 +432,7 @@ mod tests {
         for s in flat {
             let (bone, marrow) = (shape.bone(s), shape.marrow(s));
             let gap: [f64; 3] = std::array::from_fn(|i| bone[i] - marrow[i]);
-            assert!((papilla_solid::tensor::norm(gap) - 0.75).abs() < 1e-12, "{s:?}");
+            assert!((papilla_vector::norm(gap) - 0.75).abs() < 1e-12, "{s:?}");
         }
     }
 

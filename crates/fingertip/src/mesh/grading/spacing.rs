@@ -7,7 +7,7 @@
 use super::contact::{Contact, facing};
 use crate::geometry::fingertip::FingertipShape;
 use papilla_sdf::Placement;
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 
 /// How close nodes are, at one density.
 #[derive(Clone, Copy, Debug, PartialEq)]

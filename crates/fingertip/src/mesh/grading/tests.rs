@@ -4,7 +4,7 @@ use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build, build_
 use papilla_fem::element::BlockGeometry;
 use papilla_fem::mesh::{HangingNode, Mesh};
 use papilla_sdf::{IndenterSpec, Placement};
-use papilla_solid::tensor::norm;
+use papilla_vector::norm;
 use std::collections::BTreeSet;
 use std::path::Path;
 

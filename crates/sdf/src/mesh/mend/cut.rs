@@ -3,9 +3,9 @@
 use super::super::error::MeshError;
 use super::super::tree::Tree;
 use super::super::work::Work;
-use super::super::{TRIANGLES_MAX, normal, scaled_to_one};
+use super::super::{TRIANGLES_MAX, normal};
 use crate::beneath::SEAM_MM;
-use crate::vector::{cross, dot, minus, norm};
+use papilla_vector::{cross, dot, minus, norm, scaled_to_one};
 
 /// Most pieces of all triangles.
 const PIECES_MAX: usize = 4 * TRIANGLES_MAX;

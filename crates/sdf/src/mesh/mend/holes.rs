@@ -1,7 +1,7 @@
 //! Holes: their rims, and what closes them.
 
 use super::super::winding::Winding;
-use crate::vector::{along, cross, minus, norm};
+use papilla_vector::{along, cross, minus, norm};
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
 

@@ -16,9 +16,9 @@ use super::error::MeshError;
 use super::tree::Tree;
 use super::winding::Winding;
 use super::work::Work;
-use super::{Mesh, normal, scaled_to_one};
+use super::{Mesh, normal};
 use crate::beneath::SEAM_MM;
-use crate::vector::{along, norm};
+use papilla_vector::{along, norm, scaled_to_one};
 use std::collections::HashMap;
 
 /// Of an open surface some place has to be surrounded to this share: between a sheet, which has no

@@ -1,7 +1,7 @@
 use crate::mesh::tests::{ball, cuboid};
 use crate::mesh::{Mended, Mesh, MeshDistance, MeshError};
-use crate::vector::{minus, norm};
 use crate::{AnyOf, Placed, Placement, RoundedPlate, SignedDistance, Sphere};
+use papilla_vector::{minus, norm};
 use proptest::prelude::*;
 use std::sync::{Arc, OnceLock};
 

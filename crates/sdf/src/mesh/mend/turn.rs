@@ -1,7 +1,7 @@
 //! Triangles that are there twice, or are not turned as their neighbours are.
 
 use super::super::normal;
-use crate::vector::{cross, dot, minus, norm};
+use papilla_vector::{cross, dot, minus, norm};
 use std::collections::{HashMap, HashSet};
 
 /// A volume below this share of what the surface could hold says nothing.

@@ -13,7 +13,7 @@ use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_fingertip::simulation::sample::fault;
-use papilla_progress::processor;
+use papilla_processor::thread_s;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -72,7 +72,7 @@ impl Finger {
 
     /// Presses one scene to its deepest state.
     pub(super) fn solve(&self, solver: &mut Solver<'_>, press: &Indentation) -> SceneRecord {
-        let began_s = processor::thread_s();
+        let began_s = thread_s();
         let (pose, offset_mm) = (press.pose, press.offset_mm);
         let approach = Approach { pose, offset_mm, ..self.approaches[press.candidate].clone() };
         let drive = Drive::Depths(press.depths_mm.clone());
@@ -106,7 +106,7 @@ impl Finger {
             newton_iterations: iterations,
             cuts,
             j_min,
-            seconds: processor::thread_s() - began_s,
+            seconds: thread_s() - began_s,
             how: How::Recorded {
                 version: concat!("papilla-validation ", env!("CARGO_PKG_VERSION")).into(),
                 contact: ways.last().filter(|way| way.stopped.is_none()).map(|way| way.contact),

@@ -5,6 +5,7 @@ use papilla_fingertip::geometry::fingertip::{
     FingertipShape, FingertipShapeError, SurfaceParameter,
 };
 use papilla_fingertip::scene::Finger;
+use papilla_vector::{minus, norm};
 use std::path::{Path, PathBuf};
 
 /// The sequence, for the default finger.
@@ -33,8 +34,7 @@ impl Scale {
 /// From skin to bone, below the middle of the pad, to a hundredth of a millimetre.
 fn pulp_mm(shape: &FingertipShape) -> Result<f64, FingertipShapeError> {
     let bounds = shape.layers(SurfaceParameter::Body([0.0, -1.0], 0.0))?;
-    let way: [f64; 3] = std::array::from_fn(|i| bounds[3][i] - bounds[0][i]);
-    Ok((100.0 * way.iter().map(|v| v * v).sum::<f64>().sqrt()).round() / 100.0)
+    Ok((100.0 * norm(minus(bounds[3], bounds[0]))).round() / 100.0)
 }
 
 /// The presses of another campaign, or of the sequence.
