@@ -60,7 +60,7 @@ def told(name, force_n, radius):
 
 def main(dataset, maps):
     pixels, at_mm, area_mm2 = skin(Path(dataset))
-    manifest = json.load(open(f"{dataset}/manifest.json"))
+    manifest = json.loads(Path(dataset, "manifest.json").read_text())
     names = {press["id"]: press["indenter"] for press in manifest["presses"]}
     listed = manifest["campaign"].get("indenters", [])
     balls = {of["name"]: of["indenter"]["radius_mm"] for of in listed if of["indenter"]["shape"] == "sphere"}

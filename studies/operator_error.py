@@ -10,6 +10,7 @@ docs/reference/operator.md shows what this prints. Needs numpy.
 import json
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +21,7 @@ def main(operator, dataset):
     raster = np.load(f"{dataset}/raster.npz")
     drawn = lambda values: (values[raster["interface_vertex"]] * raster["interface_weight"]).sum(1)
     rows, times_ms = [], []
-    for press in json.load(open(f"{dataset}/manifest.json"))["presses"]:
+    for press in json.loads(Path(dataset, "manifest.json").read_text())["presses"]:
         shard = np.load(f"{dataset}/{press['file']}")
         for depth_mm, pressure_pa, due in zip(shard["depth_mm"], shard["pressure_pa"], shard["sed_dermis_j_per_m3"]):
             begin = time.perf_counter()

@@ -115,7 +115,7 @@ enum Command {
     /// chooses.
     #[command(after_long_help = EXIT_CODES)]
     Ladder(ladder::Options),
-    /// Measure the shipped models on this machine, in each engine, in about a minute.
+    /// Measure the shipped models on this machine, in each engine.
     ///
     /// Errors are the shipped ladder's. ONNX Runtime takes part in programs built with
     /// `--features ort`, if ORT_DYLIB_PATH names its library.
