@@ -2,9 +2,10 @@
 
 import { byId } from './notice.mjs';
 import { save } from './share.mjs';
+import { MESH_SIDE_MAX_MM, mostBytesOf } from './shapes.mjs';
 
 const MM_PER_M = 1000;
-const PLAUSIBLE_MM = { least: 3, most: 30 };
+const PLAUSIBLE_MM = { least: 3, most: MESH_SIDE_MAX_MM };
 const OTHERWISE_MM = 10;
 
 const isPlausible = (mm) => mm >= PLAUSIBLE_MM.least && mm <= PLAUSIBLE_MM.most;
@@ -21,12 +22,16 @@ export function sizeFor(sideMm) {
   return [OTHERWISE_MM, `${sideMm.toPrecision(3)} mm in the file, made ${OTHERWISE_MM} mm`];
 }
 
-/** The mesh in a file as the web client reads it: its vertices in mm about the middle of their box. Throws an Error that says what is wrong with it. */
+/**
+ * The mesh in a file as the web client reads it: its vertices in mm about the middle of their box, and what was done to it.
+ * Throws an Error that says what is wrong with it.
+ */
 export async function meshOf(bytes, name) {
   // Its readers are those of three.js, which a page without a file does not load.
   const { readMesh } = await import('./meshes.js');
   // A unit is said, so that no size is asked about: the page fits it to the finger.
-  const { vertices_mm: found, triangles } = await readMesh(bytes, name, { unit: /\.glb$/i.test(name) ? 'm' : 'mm' });
+  const read = await readMesh(bytes, name, { unit: /\.glb$/i.test(name) ? 'm' : 'mm', bytesOf: mostBytesOf });
+  const { shape: { vertices_mm: found, triangles }, decimatedMm, trianglesRead } = read;
   const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
   for (const vertex of found) {
     vertex.forEach((x, axis) => {
@@ -35,7 +40,14 @@ export async function meshOf(bytes, name) {
     });
   }
   const vertices = found.map((vertex) => vertex.map((x, axis) => x - (low[axis] + high[axis]) / 2));
-  return { name, vertices_mm: vertices, triangles, sideMm: Math.max(...high.map((x, axis) => x - low[axis])) };
+  return { name, vertices_mm: vertices, triangles, sideMm: Math.max(...high.map((x, axis) => x - low[axis])), decimatedMm, trianglesRead };
+}
+
+/** How many triangles a mesh has; of one that was decimated, how far its surface may be off when it is `sizeMm` large. */
+export function trianglesOf({ triangles, trianglesRead, decimatedMm, sideMm }, sizeMm) {
+  if (decimatedMm === 0) return `${triangles.length} triangles`;
+  const offMm = Number(((decimatedMm * sizeMm) / sideMm).toPrecision(3));
+  return `${trianglesRead} triangles became ${triangles.length}: at most ${offMm} mm off at a size of ${sizeMm} mm`;
 }
 
 /**
@@ -49,13 +61,17 @@ export function listenToMeshes(take, complain, hasMesh) {
     byId('mesh-note').textContent = mesh ? `${mesh.words}.${asked} Its side towards +z presses.` : invitation;
   };
   const read = async (file) => {
+    const before = byId('mesh-note').textContent;
+    // One that has to be decimated takes seconds.
+    byId('mesh-note').textContent = `Reading ${file.name} ...`;
     try {
       const mesh = await meshOf(await file.arrayBuffer(), file.name);
       const [size, why] = sizeFor(mesh.sideMm);
-      const told = { ...mesh, words: `${file.name}: ${mesh.triangles.length} triangles; ${why}` };
+      const told = { ...mesh, words: `${file.name}: ${trianglesOf(mesh, size)}; ${why}` };
       take(told, size);
       note(told);
     } catch (error) {
+      byId('mesh-note').textContent = before;
       complain(error.problem?.message ?? error.message);
     }
   };

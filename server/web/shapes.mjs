@@ -84,6 +84,19 @@ export const OCTAHEDRON = {
   triangles: [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
 };
 
+const MESH_DECIMALS = 4;
+/** The greatest side that a mesh can be given, mm. */
+export const MESH_SIDE_MAX_MM = 30;
+
+const bytesOfJson = (value) => JSON.stringify(value).length;
+
+/** Most bytes that a mesh takes in the hello, however large it is made: each coordinate as long as one of the greatest can be. */
+export function mostBytesOf({ vertices_mm: vertices, triangles }) {
+  const longest = Number((10 ** -MESH_DECIMALS - MESH_SIDE_MAX_MM / 2).toFixed(MESH_DECIMALS));
+  const vertex = [longest, longest, longest];
+  return bytesOfJson({ shape: 'mesh', vertices_mm: [], triangles }) + vertices.length * (bytesOfJson(vertex) + 1);
+}
+
 /** A mesh made so large that its greatest side is `size` mm. */
 export function scaled(mesh, size) {
   let most = 0;
@@ -93,7 +106,7 @@ export function scaled(mesh, size) {
     most = Math.max(most, high - low);
   }
   const factor = size / most;
-  return { ...mesh, vertices_mm: mesh.vertices_mm.map((vertex) => vertex.map((x) => Math.fround(x * factor))) };
+  return { ...mesh, vertices_mm: mesh.vertices_mm.map((vertex) => vertex.map((x) => Number((x * factor).toFixed(MESH_DECIMALS)))) };
 }
 
 /**
@@ -181,7 +194,7 @@ export const SHAPES = {
     faceMm: 0, halfMm: UNION.size / 2,
     profile: (x, y) => Math.min(ball(r, x * x + y * y), UNION.lift + plate(x, y, UNION.size, UNION.edge)),
   }) },
-  mesh: { label: 'Your own', size: ['Greatest side', 3, 30, 8], turns: true, make: (size, mesh = OCTAHEDRON) => {
+  mesh: { label: 'Your own', size: ['Greatest side', 3, MESH_SIDE_MAX_MM, 8], turns: true, make: (size, mesh = OCTAHEDRON) => {
     const { vertices_mm, triangles } = scaled(mesh, size);
     const { heights, columns, sideMm } = heightsOfMesh({ vertices_mm, triangles });
     let faceMm = -Infinity;

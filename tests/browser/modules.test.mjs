@@ -29,9 +29,9 @@ const { HERTZ, Press } = await load('press.mjs');
 const { poseOf } = await load('contact.mjs');
 const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
-const { OCTAHEDRON, SHAPES, heightsOfMesh, scaled } = await load('shapes.mjs');
+const { OCTAHEDRON, SHAPES, heightsOfMesh, mostBytesOf, scaled } = await load('shapes.mjs');
 const { indenterMesh } = await load('indenter.mjs');
-const { meshOf, sizeFor } = await load('files.mjs');
+const { meshOf, sizeFor, trianglesOf } = await load('files.mjs');
 const { bodyMesh, borderOf, followingOf, nailMesh } = await load('body.mjs');
 const { hashOf, npyOf, pythonOf, stateOf } = await load('share.mjs');
 const { rowsNear } = await load('spikes.mjs');
@@ -442,7 +442,7 @@ test('an STL and a GLB of one body are one mesh, and what is none says so', asyn
   other.vertices_mm.flat().forEach((x, k) => assert.ok(Math.abs(x - mesh.vertices_mm.flat()[k]) < 1e-3, `${x}`));
   await assert.rejects(meshOf(new ArrayBuffer(10), 'notes.txt'), /notes\.txt: none of \.stl, \.obj, \.ply, \.glb/);
   await assert.rejects(meshOf(new ArrayBuffer(10), 'cut.stl'), /cut\.stl cannot be read/);
-  await assert.rejects(meshOf(stlOf(Array(16385).fill([[0, 0, 0], [1, 0, 0], [0, 1, 0]])), 'large.stl'), /16385 triangles; a mesh may have 16384/);
+  await assert.rejects(meshOf(stlOf(Array(16385).fill([[0, 0, 0], [1, 0, 0], [0, 1, 0]])), 'large.stl'), /large\.stl has 16385 triangles, of which 16384 fit into a hello; it cannot be reduced/);
 });
 
 test('a mesh is drawn as it is, its lowest point at the origin and its normals outward', async () => {
@@ -460,6 +460,19 @@ test('a mesh is drawn as it is, its lowest point at the origin and its normals o
   }
   assert.ok(Math.abs(least) < 1e-5 && Math.abs(most - 6) < 1e-5, `${least} to ${most}`);
   assert.ok(Math.hypot(...lowest) < 1e-5, `${lowest}`);
+});
+
+test('a mesh of many triangles becomes one that fits into a hello, however large it is made', async () => {
+  const mesh = await meshOf(stlOf(dome({ radius: 60, around: 256, up: 64 })), 'large.stl');
+  assert.ok(mesh.trianglesRead === 32768 && mesh.triangles.length < 16384 && mesh.triangles.length > 15000, `${mesh.triangles.length}`);
+  const [size, why] = sizeFor(mesh.sideMm);
+  assert.equal(why, '120 mm in the file, made 10 mm');
+  const offMm = Number(trianglesOf(mesh, size).match(/^32768 triangles became \d+: at most ([0-9.e-]+) mm off at a size of 10 mm$/)[1]);
+  assert.ok(offMm > 0 && offMm < 0.01 && Math.abs(offMm / (mesh.decimatedMm / 12) - 1) < 0.01, `${offMm} of ${mesh.decimatedMm} mm`);
+  for (const sizeMm of [3, 10.01, 23.7, 30]) {
+    const bytes = JSON.stringify(SHAPES.mesh.make(sizeMm, mesh).hello).length;
+    assert.ok(bytes <= mostBytesOf(mesh) && bytes < 496 * 1024, `${bytes} bytes at ${sizeMm} mm`);
+  }
 });
 
 test('a file in metres is taken as such where that is a size of things that are touched', () => {

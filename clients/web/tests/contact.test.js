@@ -36,7 +36,7 @@ test('the code of the page tells what pushes back', async () => {
 
 test('a mesh from a file presses like the ball that it holds', async () => {
   const file = await readFile(new URL('meshes/ball.stl', import.meta.url));
-  const mesh = await readMesh(file.buffer.slice(file.byteOffset, file.byteOffset + file.byteLength), 'ball.stl');
+  const { shape: mesh } = await readMesh(file.buffer.slice(file.byteOffset, file.byteOffset + file.byteLength), 'ball.stl');
   const page = await openPage(browser);
   const forces = await page.evaluate(async (shapes) => {
     const { Hand } = await import(/** @type {any} */ ('/client/papilla.js'));
