@@ -126,6 +126,28 @@ def test_a_hand_is_its_fingers(base):
         papilla.Hand([finger, finger])
 
 
+def test_each_finger_of_a_hand_holds_what_rubs_it_within_its_cone(base):
+    rough = BALL | {"friction": 0.4}
+    terms = [{}, {"method": "coarse_pixels"}, {"method": "second_order"}]
+    hand = papilla.Hand(papilla.Finger(base, **each) for each in terms)
+    alone = [papilla.Finger(base, **each) for each in terms]
+    pulls = []
+    # Each finger's ball goes in, then aside: the first by so little that its skin sticks, the others until they slip.
+    for step in range(12):
+        shares = (0.025, 0.05, 0.08)
+        aside = [[share * max(0, step - 2), 0.0] for share in shares]
+        poses = [POSES[3] + [*at, 0, 0, 0, 0, 0] for at in aside]
+        together = hand.touch(rough, poses)
+        for finger, pose, contact in zip(alone, poses, together, strict=True):
+            assert np.array_equal(finger.touch(rough, pose).force_n, contact.force_n)
+        pulls.append([np.hypot(*contact.force_n[:2]) / contact.force_n[2] for contact in together])
+    pulls = np.array(pulls)
+    # Sticking skin pulls the harder the farther it was moved. All of it slips at the coefficient, but for the slopes
+    # of the pad.
+    assert (np.diff(pulls[3:, 0]) > 0.0).all() and pulls[-1, 0] < 0.9 * pulls[-1, 2]
+    assert pulls[-1, 2] == pytest.approx(0.4, abs=0.04)
+
+
 def test_what_cannot_be_is_said(base, tmp_path):
     finger = papilla.Finger(base)
     with pytest.raises(papilla.BadInput, match=r"\(2, 7\), or a batch"):
