@@ -2,11 +2,11 @@
 //! and next ones, after moves of 10 um.
 //!
 //! ```sh
-//! cargo bench -p papilla-contact --bench frames -- --poses 300
+//! cargo bench -p papilla-contact --bench frames -- --poses 300 [--friction 0.5]
 //! ```
 //!
 //! The poses are those of the example `unsettled`. Of each pose's next frames the least time counts, which
-//! other work on the machine disturbs least.
+//! other work on the machine disturbs least. With friction the moves are along the skin as well.
 
 #[path = "../examples/poses/mod.rs"]
 mod poses;
@@ -40,7 +40,7 @@ const METHODS: [(&str, Option<PixelSpacing>); 3] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let (mut poses, mut seed, mut moves) = (300, 20, 8);
+    let (mut poses, mut seed, mut moves, mut friction) = (300, 20, 8, 0.0);
     // `cargo test` starts benches too, with words of its own.
     if !std::env::args().any(|word| word == "--bench") {
         return Ok(());
@@ -49,18 +49,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     while let Some(word) = words.next() {
         let number = words.next().ok_or(format!("{word} needs a number"))?;
         match word.as_str() {
+            "--friction" => friction = number.parse()?,
             "--poses" => poses = number.parse()?,
             "--seed" => seed = number.parse()?,
             "--moves" => moves = number.parse()?,
-            _ => return Err(format!("{word}: use --poses N, --seed N, --moves N").into()),
+            _ => {
+                let use_instead = "--poses N, --seed N, --moves N, --friction COEFFICIENT";
+                return Err(format!("{word}: use {use_instead}").into());
+            }
         }
     }
     let pad = Pad::of(Path::new(MODELS))?;
-    println!("{poses} poses of seed {seed}, us: median / 95th percentile\n");
+    println!("{poses} poses of seed {seed}, friction {friction}, us: median / 95th percentile\n");
     println!("| method | poses that touch | first frame | next frame | next frame, settled |");
     println!("|---|---|---|---|---|");
     for (name, spacing) in METHODS {
-        let times = measure(&pad, spacing, [poses, moves], seed)?;
+        let times = measure(&pad, spacing, [poses, moves], seed, friction)?;
         let column = |of: &dyn Fn(&Times) -> Option<f64>| {
             let mut column: Vec<f64> = times.iter().filter_map(of).collect();
             column.sort_by(f64::total_cmp);
@@ -80,9 +84,11 @@ fn measure(
     spacing: Option<PixelSpacing>,
     [poses, moves]: [usize; 2],
     seed: u64,
+    friction: f64,
 ) -> Result<Vec<Times>, Box<dyn Error>> {
     let shapes = shapes();
-    let mut solver = Solver::new(Arc::clone(&pad.model), Settings::default())?;
+    let settings = Settings { friction: friction > 0.0, ..Settings::default() };
+    let mut solver = Solver::new(Arc::clone(&pad.model), settings)?;
     let mut pixels = spacing.map(|s| PixelContact::new(Arc::clone(&pad.skin), &pad.model, s));
     let mut out = Contact::new(pad.model.vertices());
     let mut random = fastrand::Rng::with_seed(seed);
@@ -93,6 +99,7 @@ fn measure(
         if pad.clearance_mm(&object) < -DEPTH_MM {
             continue;
         }
+        object.friction = friction;
         solver.reset();
         if let Some(pixels) = &mut pixels {
             pixels.reset();
@@ -115,7 +122,11 @@ fn measure(
         }
         let (mut next, mut settled) = (f64::INFINITY, true);
         for step in 0..moves {
-            object.placement.origin_mm[2] += if step % 2 == 0 { MOVE_MM } else { -MOVE_MM };
+            let by_mm = if step % 2 == 0 { MOVE_MM } else { -MOVE_MM };
+            object.placement.origin_mm[2] += by_mm;
+            if friction > 0.0 {
+                object.placement.origin_mm[1] += by_mm;
+            }
             let (us, _, is_settled) = frame(&object)?;
             next = next.min(us);
             settled &= is_settled;
