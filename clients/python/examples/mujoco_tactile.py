@@ -28,27 +28,38 @@ def places_of(depth_mm):
     return PAD_MM - [0.0, 0.0, RADIUS_MM - depth_mm]
 
 
+class Sensor:
+    """MuJoCo's tactile sensor at the vertices of the skin, and a ball."""
+
+    def __init__(self, atlas):
+        spec = mujoco.MjSpec()
+        skin = spec.add_mesh(name="skin")
+        skin.uservert, skin.userface = 1e-3 * atlas.positions_mm.ravel(), atlas.triangles.ravel().astype(np.int32)
+        # The skin is open where the finger ends: it has no volume.
+        skin.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        finger = spec.worldbody.add_body(name="finger")
+        finger.add_geom(name="pad", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="skin")
+        # Two bodies that stand still do not touch in MuJoCo: the ball is free, and nothing is ever stepped here.
+        ball = spec.worldbody.add_body(name="ball")
+        ball.add_freejoint()
+        ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-3 * RADIUS_MM, 0, 0])
+        sensor = spec.add_sensor(name="felt", type=mujoco.mjtSensor.mjSENS_TACTILE)
+        sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_MESH, "skin"
+        sensor.reftype, sensor.refname = mujoco.mjtObj.mjOBJ_GEOM, "pad"
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+
+    def depth_m(self, centre_mm):
+        """Depth of each vertex in the ball, whose centre is there in the finger's frame."""
+        self.data.qpos[:3] = 1e-3 * np.asarray(centre_mm)
+        mujoco.mj_forward(self.model, self.data)
+        # Three values a vertex: depth, and speeds of sliding along two tangents.
+        return self.data.sensordata.reshape(3, -1)[0].copy()
+
+
 def by_mujoco(atlas, depth_mm):
     """Depth at each vertex of the skin, m, as the sensor tells it."""
-    spec = mujoco.MjSpec()
-    skin = spec.add_mesh(name="skin")
-    skin.uservert, skin.userface = 1e-3 * atlas.positions_mm.ravel(), atlas.triangles.ravel().astype(np.int32)
-    # The skin is open where the finger ends: it has no volume.
-    skin.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-    finger = spec.worldbody.add_body(name="finger")
-    finger.add_geom(name="pad", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="skin")
-    # Two bodies that stand still do not touch in MuJoCo: the ball is free, and nothing is ever stepped.
-    ball = spec.worldbody.add_body(name="ball", pos=1e-3 * places_of(depth_mm))
-    ball.add_freejoint()
-    ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-3 * RADIUS_MM, 0, 0])
-    sensor = spec.add_sensor(name="felt", type=mujoco.mjtSensor.mjSENS_TACTILE)
-    sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_MESH, "skin"
-    sensor.reftype, sensor.refname = mujoco.mjtObj.mjOBJ_GEOM, "pad"
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    # Three values a vertex: depth, and speeds of sliding along two tangents.
-    return data.sensordata.reshape(3, -1)[0].copy()
+    return Sensor(atlas).depth_m(places_of(depth_mm))
 
 
 def by_papilla(finger, depth_mm):
