@@ -419,7 +419,7 @@ def long() -> list[Step]:
             "friction in the loop with MuJoCo: a ball rests, a block is held for ten seconds, then slips",
             "clients/test mujoco",
             after=("wheel",),
-            tests_min=4,
+            tests_min=5,
             installs="pip: mujoco (8 MB)",
         ),
         Step(
