@@ -61,7 +61,7 @@ pub use papilla_atlas as atlas;
 /// Shapes that a hello announces.
 pub use papilla_sdf as sdf;
 
-pub use effects::RuntimeEffect;
+pub use effects::{RuntimeEffect, unknown_effect};
 pub use error::{ErrorCode, Problem};
 pub use error_estimate::{ERROR_ESTIMATE_LEN, ErrorEstimate, LikelyError};
 pub use frame::{FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, flags};

@@ -7,9 +7,9 @@ use papilla_proto::{
     ErrorCode, HEADER_LEN, Hello, MAP_LEN, Problem, RuntimeEffect, SampleType,
     atlas::{Patch, Raster},
     effects::{Drive, Section},
-    error::shortened,
     flags,
     spikes::PlacedUnit,
+    unknown_effect,
 };
 use papilla_session_effects as effects;
 use papilla_session_effects::{Effects, Written};
@@ -45,8 +45,7 @@ impl Feel {
         hello::check_form(hello)?;
         if let Some(name) = hello.effects.iter().find(|name| name.parse::<RuntimeEffect>().is_err())
         {
-            let message = format!("no effect '{}'", shortened(name));
-            return Err(Problem::new(ErrorCode::UnknownEffect, message).at("effects"));
+            return Err(unknown_effect(name, None));
         }
         let needs = "it changes pressure or SED beside the network: a session has it";
         for effect in [RuntimeEffect::Relaxation, RuntimeEffect::ShearEnergy] {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use papilla_proto::{
     ClientMessage, ErrorCode, Hello, Problem, RuntimeEffect, contact::DEFAULT_FINGER,
-    error::shortened,
+    error::shortened, unknown_effect,
 };
 
 use crate::{Model, Network};
@@ -67,9 +67,7 @@ pub(crate) fn choose(hello: &Hello, model: &Model) -> Result<Arc<Network>, Probl
     let name = &info.name;
     let is_foreign = |e: &&String| e.parse::<RuntimeEffect>().is_err() && !info.effects.contains(e);
     if let Some(effect) = hello.effects.iter().find(is_foreign) {
-        let (effect, rendered) = (shortened(effect), info.effects.join(", "));
-        let message = format!("tier {name} renders {rendered}, but not '{effect}'");
-        return Err(Problem::new(ErrorCode::UnknownEffect, message).at("effects"));
+        return Err(unknown_effect(effect, Some((name, &info.effects))));
     }
     if let Some(hash) = hello.atlas_hash.as_ref().filter(|&hash| *hash != info.atlas_hash) {
         let (hash, ours) = (shortened(hash), &info.atlas_hash);

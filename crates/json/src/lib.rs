@@ -13,6 +13,7 @@
 //! # Ok::<_, papilla_json::JsonError>(())
 //! ```
 
+mod meant;
 mod text;
 
 use std::fmt;
@@ -20,6 +21,7 @@ use std::fmt;
 use serde::de::DeserializeOwned;
 use serde_path_to_error::Track;
 
+pub use meant::{meant, nearest};
 pub use text::{TextError, plain, read_text, text};
 
 /// Longest name or text that [`read_bounded`] takes, bytes as they stand in the JSON.

@@ -8,6 +8,8 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::{ErrorCode, Problem, shortened};
+
 /// An effect of the session, as opposed to one that a model was trained with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -86,6 +88,26 @@ impl FromStr for RuntimeEffect {
     fn from_str(text: &str) -> Result<Self, ()> {
         Self::ALL.into_iter().find(|effect| effect.as_str() == text).ok_or(())
     }
+}
+
+/// The problem of an effect that no session has and its tier does not render; `tier` is the tier's name
+/// and what it renders, if a tier is asked at all. The problem names all effects, and the one that was
+/// probably meant.
+#[must_use]
+pub fn unknown_effect(effect: &str, tier: Option<(&str, &[String])>) -> Problem {
+    let of_sessions = RuntimeEffect::ALL.map(RuntimeEffect::as_str);
+    let (whose, rendered) = match tier {
+        Some((name, rendered)) => (format!("tier {name} has "), rendered),
+        None => ("there is ".to_owned(), &[][..]),
+    };
+    let known = of_sessions.into_iter().chain(rendered.iter().map(String::as_str));
+    let meant = papilla_json::meant(effect, known);
+    let (effect, of_sessions) = (shortened(effect), of_sessions.join(", "));
+    let mut message = format!("{whose}no effect '{effect}'{meant}; sessions have {of_sessions}");
+    if !rendered.is_empty() {
+        message += &format!("; this tier renders {}", rendered.join(", "));
+    }
+    Problem::new(ErrorCode::UnknownEffect, message).at("effects")
 }
 
 /// Parameters of [`RuntimeEffect::ContactWindow`].

@@ -30,3 +30,26 @@ fn parameters_left_out_have_their_default_and_misspelt_ones_are_refused() {
     assert!(serde_json::from_value::<Layout>(json!({"radius_mm": 1.0})).is_err());
     assert!(serde_json::from_value::<Relaxation>(json!({"tissue": "nail"})).is_err());
 }
+
+#[test]
+fn an_unknown_effect_is_told_with_all_that_there_are_and_the_nearest() {
+    let rendered = ["layers".to_owned(), "finite_strain".to_owned()];
+    let told = |effect: &str| unknown_effect(effect, Some(("small", &rendered)));
+    for (effect, meant) in [
+        ("sumary", "was 'summary' meant?"),
+        ("layer", "was 'layers' meant?"),
+        ("finite-strian", "was 'finite_strain' meant?"),
+    ] {
+        let problem = told(effect);
+        assert_eq!(problem.code, ErrorCode::UnknownEffect);
+        assert_eq!(problem.field.as_deref(), Some("effects"));
+        assert!(problem.message.contains(meant), "{}", problem.message);
+        let sessions = RuntimeEffect::ALL.map(RuntimeEffect::as_str);
+        for known in sessions.into_iter().chain(rendered.iter().map(String::as_str)) {
+            assert!(problem.message.contains(known), "{} lacks {known}", problem.message);
+        }
+    }
+    assert!(!told("sound").message.contains("meant"));
+    let alone = unknown_effect("spike", None).message;
+    assert!(alone.contains("was 'spikes' meant?") && !alone.contains("tier"), "{alone}");
+}

@@ -128,6 +128,11 @@ async fn a_hello_that_cannot_be_met_may_be_said_again() {
         let error = socket.hear_refusal(code).await;
         assert_eq!(error["field"], field, "{error}");
     }
+    // Of a misspelt effect all that there are, and the nearest.
+    socket.send(hello(&json!({"effects": ["summry"]})).to_string()).await;
+    let error = socket.hear_refusal("unknown_effect").await;
+    let told = error["message"].as_str().unwrap();
+    assert!(told.contains("was 'summary' meant?") && told.contains("spikes"), "{told}");
     // A decimal comma, as programs of a German desktop print it, is no JSON.
     let comma = hello(&json!({"objects": []})).to_string();
     socket.send(comma.replace("[]", r#"[{"radius_mm": 10,5}]"#)).await;

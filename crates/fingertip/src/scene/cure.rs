@@ -31,9 +31,13 @@ fn cure(message: &str, page: &str) -> String {
     if message.starts_with("unknown field") {
         let meant =
             |known: &&&str| known.strip_prefix(quoted[0]).is_some_and(|r| r.starts_with('_'));
-        return quoted.iter().skip(1).find(meant).map_or_else(String::new, |meant| {
-            format!("; did you mean `{meant}`? Units stand in the names of fields")
-        });
+        if let Some(meant) = quoted.iter().skip(1).find(meant) {
+            return format!("; did you mean `{meant}`? Units stand in the names of fields");
+        }
+    }
+    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
+        let near = papilla_json::nearest(quoted[0], quoted.iter().skip(1).copied());
+        return near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
     }
     if message.starts_with("invalid type: string") && message.ends_with("expected f64") {
         return ": write a bare number, its unit stands in the name of the field".into();

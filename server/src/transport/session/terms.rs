@@ -14,6 +14,7 @@ use papilla_proto::{
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
     spikes::PlacedUnit,
+    unknown_effect,
 };
 use papilla_session_contact::{ContactAssets, Hand, Skin, of_finger};
 use papilla_session_effects::Effects;
@@ -366,9 +367,7 @@ fn choose(
         return Err(Problem::new(ErrorCode::Overloaded, message).at("tier"));
     }
     if let Some(effect) = wanted.iter().find(|effect| !tier.effects.contains(effect)) {
-        let (effect, rendered) = (shortened(effect), tier.effects.join(", "));
-        let message = format!("tier {} renders {rendered}, but not '{effect}'", tier.name);
-        return Err(Problem::new(ErrorCode::UnknownEffect, message).at("effects"));
+        return Err(unknown_effect(effect, Some((&tier.name, &tier.effects))));
     }
     if let Some(hash) = hello.atlas_hash.as_ref().filter(|&hash| *hash != tier.atlas_hash) {
         let (hash, ours) = (shortened(hash), &tier.atlas_hash);

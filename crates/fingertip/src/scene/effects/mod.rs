@@ -168,7 +168,8 @@ impl TryFrom<String> for EffectName {
     fn try_from(name: String) -> Result<Self, String> {
         Self::named(&name).ok_or_else(|| {
             let known: Vec<_> = EFFECTS.iter().map(|e| e.name).collect();
-            format!("unknown effect '{name}'; there are: {}", known.join(", "))
+            let meant = papilla_json::meant(&name, known.iter().copied());
+            format!("unknown effect '{name}'{meant}; there are: {}", known.join(", "))
         })
     }
 }
