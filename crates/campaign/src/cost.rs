@@ -12,6 +12,9 @@ use std::time::Instant;
 #[derive(Debug, Serialize)]
 struct IndenterCost {
     indenter: String,
+    /// What was done to its meshes.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    mended: Vec<String>,
     presses: usize,
     unknowns: usize,
     /// With the factorization of an indefinite tangent.
@@ -110,6 +113,7 @@ impl CampaignCost {
                 mib(i.memory_bytes),
                 i.seconds
             );
+            text += &i.mended.iter().map(|done| format!("    {done}\n")).collect::<String>();
         }
         for Refused { press, indenter, reason } in &self.refused {
             text += &format!("  will fail: indentation {press} ({indenter}): {reason}\n");
@@ -145,6 +149,7 @@ fn cost(
     let own_mesh_s = if spec.order == Order::Graded { setup_s } else { 0.0 };
     Ok(IndenterCost {
         indenter: candidate.name.clone(),
+        mended: setup.approach.shape.mended(),
         presses: 1,
         unknowns: forecast.census.unknowns,
         memory_bytes: forecast.memory_bytes + forecast.memory_indefinite_bytes,

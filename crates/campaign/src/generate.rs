@@ -64,6 +64,16 @@ fn solved(
     spec.validate()?;
     let candidates = spec.candidates();
     let first = candidates.first().ok_or(CampaignError::Lacks("an indenter"))?;
+    let shape = |of: &Candidate| {
+        let built = of.indenter.build(&spec.folder).map_err(IndenterError::from);
+        built.map_err(|error| CampaignError::Simulation(error.into()))
+    };
+    let shapes = candidates.iter().map(shape).collect::<Result<Vec<_>, _>>()?;
+    for (candidate, shape) in candidates.iter().zip(&shapes) {
+        for done in shape.mended() {
+            tracing::warn!(indenter = candidate.name, "{done}");
+        }
+    }
     let Simulation { body, approach, .. } = Simulation::new(&spec.scene(first))?;
     let (atlas, _) = body
         .atlas()
@@ -74,15 +84,15 @@ fn solved(
         let solver = || Ok(OwnMesh { spec, candidates: &candidates });
         return solve(spec, (&atlas, lattice.as_deref()), solver, folder, options);
     }
-    let mut approaches = Vec::new();
-    for candidate in &candidates {
-        let shape = candidate.indenter.build(&spec.folder).map_err(IndenterError::from);
-        approaches.push(Approach {
-            shape: shape.map_err(|error| CampaignError::Simulation(error.into()))?,
+    let approaches: Vec<_> = candidates
+        .iter()
+        .zip(shapes)
+        .map(|(candidate, shape)| Approach {
+            shape,
             top_mm: candidate.indenter.top_mm(),
             ..approach.clone()
-        });
-    }
+        })
+        .collect();
     let solver = || -> Result<OneMesh<'_>, BoxError> {
         let solver = body.solver(Options::default())?;
         Ok(OneMesh { body: &body, solver, approaches: &approaches })

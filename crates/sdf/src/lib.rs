@@ -52,8 +52,8 @@ pub use cylinder::Cylinder;
 pub use dots::Dots;
 pub use grating::Grating;
 pub use heightmap::{HeightField, Heightmap};
-pub use mesh::{Mended, Mesh, MeshDistance, MeshError, TRIANGLES_MAX};
-pub use mesh_file::{LengthUnit, MeshFile};
+pub use mesh::{Decimated, Mended, Mesh, MeshDistance, MeshError, TRIANGLES_MAX};
+pub use mesh_file::{FileSurface, LengthUnit, MeshFile};
 pub use placed::{Placed, Placement};
 pub use plate::{Plate, RoundedPlate};
 pub use punch::Punch;
@@ -110,8 +110,8 @@ pub trait SignedDistance: Send + Sync {
         1.0
     }
 
-    /// What was done to meshes in it to make bodies of them, for people; empty of a body that is as
-    /// it was told.
+    /// What was done to meshes in it to make bodies of them, and to have fewer triangles, for people;
+    /// empty of a body that is as it was told.
     fn mended(&self) -> Vec<String> {
         Vec::new()
     }

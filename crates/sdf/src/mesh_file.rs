@@ -1,7 +1,7 @@
 //! Indenter `mesh` of a scene: triangles from an STL, OBJ, PLY or GLB file, in the unit it names.
 
 use super::Mesh;
-use super::mesh::{MeshError, TRIANGLES_MAX};
+use super::mesh::{Decimated, MeshError, TRIANGLES_MAX};
 use super::rules::{BadValue, ShapeError, require};
 use crate::MeshDistance;
 use serde::{Deserialize, Serialize};
@@ -76,7 +76,16 @@ pub struct MeshFile {
     pub unit: Option<LengthUnit>,
     /// What the file holds, once it was read.
     #[serde(skip)]
-    pub mesh: Option<Arc<Mesh>>,
+    pub surface: Option<Arc<FileSurface>>,
+}
+
+/// The surface that a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileSurface {
+    /// Its triangles: few enough to press with.
+    pub mesh: Mesh,
+    /// What was done where the file has more.
+    pub decimated: Option<Decimated>,
 }
 
 impl MeshFile {
@@ -88,8 +97,8 @@ impl MeshFile {
     /// Reads the file, which `folder` is the place of, if it was not read, and names the unit that it
     /// was taken in.
     pub(super) fn load(&mut self, folder: &Path) -> Result<(), ShapeError> {
-        if self.mesh.is_none() {
-            self.mesh = Some(Arc::new(self.read(folder)?));
+        if self.surface.is_none() {
+            self.surface = Some(Arc::new(self.read(folder)?));
             #[cfg(feature = "files")]
             self.unit.get_or_insert(LengthUnit::of(&self.file));
         }
@@ -98,55 +107,64 @@ impl MeshFile {
 
     /// Refuses the file: this build reads none.
     #[cfg(not(feature = "files"))]
-    fn read(&self, folder: &Path) -> Result<Mesh, ShapeError> {
+    fn read(&self, folder: &Path) -> Result<FileSurface, ShapeError> {
         let message = "this program is built without the feature `files`".into();
         Err(ShapeError::MeshFile { path: folder.join(&self.file), message })
     }
 
     #[cfg(feature = "files")]
-    fn read(&self, folder: &Path) -> Result<Mesh, ShapeError> {
+    fn read(&self, folder: &Path) -> Result<FileSurface, ShapeError> {
         let path = folder.join(&self.file);
+        let refused = |message| Err(ShapeError::MeshFile { path: path.clone(), message });
         let unit = self.unit.unwrap_or_else(|| LengthUnit::of(&self.file));
         let mesh = match crate::files::surface(&path, unit.mm()) {
             Ok(mesh) => mesh,
-            Err(error) => return Err(ShapeError::MeshFile { path, message: error.to_string() }),
+            Err(error) => return refused(error.to_string()),
         };
-        match self.unit {
-            None => believed(&mesh, unit)
-                .map(|()| mesh)
-                .map_err(|message| ShapeError::MeshFile { path, message }),
-            Some(_) => Ok(mesh),
+        if let (None, Err(doubt)) = (self.unit, believed(&mesh, unit)) {
+            return refused(doubt);
+        }
+        match super::mesh::few_enough(&mesh) {
+            Ok(None) => Ok(FileSurface { mesh, decimated: None }),
+            Ok(Some((mesh, done))) => Ok(FileSurface { mesh, decimated: Some(done) }),
+            Err(error) => refused(with_cure(&error, &path)),
         }
     }
 
     /// How far it goes along a unit vector, mm; infinite before the file was read.
     pub(super) fn bound_mm(&self, direction: [f64; 3]) -> f64 {
         let along = |p: &[f64; 3]| papilla_vector::dot(*p, direction);
-        self.mesh.as_ref().map_or(f64::INFINITY, |mesh| {
-            mesh.vertices_mm.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
+        self.surface.as_ref().map_or(f64::INFINITY, |of| {
+            of.mesh.vertices_mm.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
         })
     }
 
     /// Its signed distance.
     pub(super) fn build(&self, folder: &Path) -> Result<MeshDistance, ShapeError> {
-        let read = match &self.mesh {
-            Some(mesh) => Arc::clone(mesh),
+        let read = match &self.surface {
+            Some(read) => Arc::clone(read),
             None => Arc::new(self.read(folder)?),
         };
-        read.build().map_err(|error| {
-            let path = folder.join(&self.file);
-            let how = match error {
-                MeshError::Count { found } if found > TRIANGLES_MAX => format!(
-                    ". A mesh program does that (MeshLab: Quadric Edge Collapse Decimation; Blender: \
-                     the modifier Decimate), or Python: trimesh.load({:?}, force=\"mesh\")\
-                     .simplify_quadric_decimation(face_count={TRIANGLES_MAX}).export(\"fewer.stl\"), \
-                     with the packages of papilla[meshes]",
-                    path.display().to_string()
-                ),
-                _ => String::new(),
-            };
-            ShapeError::MeshFile { message: format!("{error}{how}"), path }
-        })
+        match read.mesh.build() {
+            Ok(built) => Ok(built.with(read.decimated)),
+            Err(error) => {
+                let path = folder.join(&self.file);
+                Err(ShapeError::MeshFile { message: with_cure(&error, &path), path })
+            }
+        }
+    }
+}
+
+/// Why a mesh bounds no body; of one that cannot be decimated far enough also what else to do.
+fn with_cure(error: &MeshError, path: &Path) -> String {
+    match error {
+        MeshError::Count { found } if *found > TRIANGLES_MAX => format!(
+            "{found} triangles are left where decimation ends; {TRIANGLES_MAX} at most press. A mesh \
+             program may get further (MeshLab: Quadric Edge Collapse Decimation; Blender: the modifier \
+             Decimate), or leave parts of {} out that do not touch the finger",
+            path.display()
+        ),
+        _ => error.to_string(),
     }
 }
 
@@ -272,18 +290,58 @@ mod tests {
         assert!((top_mm - 1.0).abs() < 1e-9 && text.contains("unit = \"mm\""), "{text}");
     }
 
+    /// A plate of many small squares, its faces as even as they were.
     #[test]
-    fn too_many_triangles_are_refused_with_the_way_to_fewer() {
+    fn too_many_triangles_become_fewer_and_it_is_said_how_far_they_are_off() {
         let folder = tempfile::tempdir().unwrap();
-        let mut text = obj(1.0);
-        text += &"f 1 2 3\n".repeat(crate::TRIANGLES_MAX);
+        let (side, bulge_mm) = (120u32, 0.01);
+        let mut text = String::new();
+        // Two sheets, the upper one a bowl turned over, and a rim between them.
+        for z in [0.0, 1.0] {
+            for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+                let [x, y] = [i, j].map(|k| 2.0 * f64::from(k) / f64::from(side - 1) - 1.0);
+                let round = z * bulge_mm * (1.0 - x * x) * (1.0 - y * y);
+                text += &format!("v {x} {y} {}\n", z + round);
+            }
+        }
+        let at = |i: u32, j: u32, top: bool| 1 + side * i + j + if top { side * side } else { 0 };
+        let mut square =
+            |[a, b, c, d]: [u32; 4]| text += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        for (i, j) in (0..side - 1).flat_map(|i| (0..side - 1).map(move |j| (i, j))) {
+            square([(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| at(i, j, true)));
+            square([(i, j), (i, j + 1), (i + 1, j + 1), (i + 1, j)].map(|(i, j)| at(i, j, false)));
+        }
+        let last = side - 1;
+        for k in 0..last {
+            for [p, q] in [
+                [(k, 0), (k + 1, 0)],
+                [(last, k), (last, k + 1)],
+                [(k + 1, last), (k, last)],
+                [(0, k + 1), (0, k)],
+            ] {
+                let [low, high] = [false, true].map(|top| [p, q].map(|(i, j)| at(i, j, top)));
+                square([low[0], low[1], high[1], high[0]]);
+            }
+        }
         std::fs::write(folder.path().join("many.obj"), text).unwrap();
-        let spec: IndenterSpec = toml::from_str("shape = \"mesh\"\nfile = \"many.obj\"").unwrap();
-        let said = spec.build(folder.path()).err().unwrap().to_string();
-        assert!(
-            said.contains("simplify it. A mesh program") && said.contains("face_count"),
-            "{said}"
-        );
+        let mut spec: IndenterSpec =
+            toml::from_str("shape = \"mesh\"\nfile = \"many.obj\"").unwrap();
+        spec.load(folder.path()).unwrap();
+        let shape = spec.build(folder.path()).unwrap();
+        let said = shape.mended();
+        assert!(said.len() == 1, "{said:?}");
+        let told = 4 * (last * last + 2 * last);
+        assert!(said[0].starts_with(&format!("{told} triangles became 16")), "{said:?}");
+        let off_mm: f64 =
+            said[0].split(" at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!(off_mm > 0.0 && off_mm < 1e-4, "{said:?}");
+        // As far from points above as the bowl is, but for that.
+        for [x, y] in [[0.0, 0.0], [0.5, 0.25], [-0.75, 0.5]] {
+            let top_mm = 1.0 + bulge_mm * (1.0 - x * x) * (1.0 - y * y);
+            let gap_mm = shape.distance([x, y, 2.0]).gap_mm;
+            assert!((gap_mm - (2.0 - top_mm)).abs() < 1e-4, "{gap_mm} at {x}, {y}");
+        }
+        assert!((spec.top_mm() - 1.01).abs() < 1e-5, "{}", spec.top_mm());
     }
 
     #[test]

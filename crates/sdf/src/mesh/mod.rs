@@ -8,6 +8,7 @@
 
 mod check;
 mod closest;
+mod decimate;
 mod error;
 mod mend;
 mod shells;
@@ -15,6 +16,9 @@ mod tree;
 mod winding;
 mod work;
 
+pub use decimate::Decimated;
+#[cfg(feature = "files")]
+pub(super) use decimate::few_enough;
 pub use error::MeshError;
 pub use mend::Mended;
 
@@ -63,6 +67,7 @@ pub struct MeshDistance {
     corners_mm: Vec<[f64; 3]>,
     cost: f64,
     mended: Option<(Winding, Mended)>,
+    decimated: Option<Decimated>,
 }
 
 /// A triangle, ready to be asked.
@@ -131,7 +136,7 @@ impl MeshDistance {
             Face { corners_mm: place(*triangle), normals: normals.map(scaled_to_one) }
         });
         let faces = faces.collect();
-        let mut built = Self { faces, tree, corners_mm, cost: 1.0, mended: None };
+        let mut built = Self { faces, tree, corners_mm, cost: 1.0, mended: None, decimated: None };
         built.cost = 1.0 + PER_TRIANGLE * built.triangles_asked();
         built
     }
@@ -156,6 +161,12 @@ impl MeshDistance {
         built.cost += PER_WINDING * f64::from(looked) / count;
         built.mended = Some((winding, mended));
         Ok(built)
+    }
+
+    /// Says of itself that it was made of more triangles.
+    pub(super) fn with(mut self, decimated: Option<Decimated>) -> Self {
+        self.decimated = decimated;
+        self
     }
 
     /// What was done to the mesh to make a body of it; nothing to a closed one.
@@ -212,7 +223,8 @@ impl SignedDistance for MeshDistance {
     }
 
     fn mended(&self) -> Vec<String> {
-        self.mended.iter().map(|(_, mended)| mended.to_string()).collect()
+        let decimated = self.decimated.iter().map(ToString::to_string);
+        decimated.chain(self.mended.iter().map(|(_, mended)| mended.to_string())).collect()
     }
 
     fn distance(&self, p: [f64; 3]) -> Distance {
