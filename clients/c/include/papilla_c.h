@@ -65,7 +65,7 @@ enum {
 #define PAPILLA_FLAG_UNSETTLED 8u    /* the contact solve did not settle: its answer is rough */
 #define PAPILLA_FLAG_CUT_OFF 16u     /* the contact reaches the edge of the atlas */
 #define PAPILLA_FLAG_NOT_TRACKED 32u /* the frame told that nobody knows where things are; all is zero */
-#define PAPILLA_FLAG_COARSE_CLOCK 64u /* time_us ticks so coarsely that rates and spikes may be far off */
+#define PAPILLA_FLAG_COARSE_CLOCK 64u /* time_us ticks so coarsely, or is in ms or ns, that rates and spikes may be far off */
 
 /* A folder of models, read once, for any number of sessions. */
 typedef struct PapillaModel PapillaModel;

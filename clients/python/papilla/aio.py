@@ -20,7 +20,7 @@ from .answer import Answer, Problem
 from .calls import Sends
 from .errors import BadInput, Closed, Refused, Unreachable
 from .http import DEFAULT_URL, LOCAL, refusal, without_service
-from .link import Frame, StaysError, Warned, dial, questions, told_beyond, told_refused, told_stays
+from .link import TOLD_CLOCK, Frame, StaysError, Warned, dial, questions, told_beyond, told_refused, told_stays
 from .wire import NetForce, Window
 
 _PATIENCE_S: Final = 30.0
@@ -435,6 +435,8 @@ class AsyncSession(Sends):
             tier = self._tiers.get(header.tier, "")
             if "out_of_range" in header.flags:
                 self._warned.once("out_of_range", told_beyond(tier))
+            if "coarse_clock" in header.flags:
+                self._warned.once("coarse_clock", TOLD_CLOCK)
             frame.give(answers.read(message, header, frame.ready, tier))
 
     def _told(self, message: dict[str, Any]) -> None:

@@ -130,7 +130,7 @@ class Answer:
     not_tracked: bool = False
     """To a frame that said that nobody knows where things are: all is zero."""
     coarse_clock: bool = False
-    """The client's clock ticks so coarsely, or stands, that rates and spikes may be far off."""
+    """The client's clock ticks so coarsely, stands, or counts ms or ns, so that rates and spikes may be far off."""
     finger: int = 0
     tier: str = ""
     window: Window = wire.WHOLE

@@ -119,6 +119,13 @@ def told_beyond(tier: str) -> str:
     return f"pressure is beyond what tier {tier} knows; such answers are flagged"
 
 
+TOLD_CLOCK: Final = (
+    "the times of the frames have steps above 20 ms, stand still, or are in ms or ns in place of us; "
+    "rates, spikes and creep in such answers are wrong, and flagged coarse_clock"
+)
+"""Said once of times that effects cannot go by."""
+
+
 def told_refused(problem: Problem) -> str:
     """Said once of frames that were refused."""
     return f"a frame was refused: {problem.message}"

@@ -71,6 +71,7 @@ class InProcess(Protocol):
     ) -> tuple[int, Problem] | None: ...
 
     def warn_beyond(self) -> None: ...
+    def warn_clock(self) -> None: ...
 
 
 class Terms(NamedTuple):
@@ -278,6 +279,8 @@ class _InProcess:
             raise FrameFailed(frames[number].number, "error", problem.message)
         if self._rows.has_flag("out_of_range", first, len(frames)):
             session.warn_beyond()
+        if self._rows.has_flag("coarse_clock", first, len(frames)):
+            session.warn_clock()
 
     def series(self, times_s: NDArray[np.float64] | None, warnings: Sequence[str], seconds: float) -> Series:
         return self._rows.series(self._tier, times_s, warnings, seconds)

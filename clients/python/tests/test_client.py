@@ -4,6 +4,7 @@ import asyncio
 import os
 import runpy
 import socket
+import time
 from pathlib import Path
 
 import numpy as np
@@ -149,6 +150,21 @@ def test_spikes_that_did_not_fit_are_counted(url):
         with pytest.raises(papilla.PapillaError, match="spikes"):
             papilla.SpikeTrains(session.ready)
     assert 0 < len(trains.unit) <= 30 and trains.lost > 0
+
+
+@pytest.mark.parametrize("unit", ["us", "ms", "ns"])
+def test_times_in_another_unit_are_noticed_in_a_live_session(url, unit):
+    of_ns = {"us": 1000, "ms": 1_000_000, "ns": 1}[unit]
+    with papilla.Session(url, tier="half-space", effects=["relaxation", "summary"], map=False) as session:
+        flagged, begin = [], time.monotonic()
+        until_s = 3.0 if unit == "us" else 20.0
+        while not any(flagged) and time.monotonic() - begin < until_s:
+            answer = session.render(bump(1e4), client_time_us=time.monotonic_ns() // of_ns)
+            flagged.append(answer.coarse_clock)
+            time.sleep(0.01)
+        told = [words for words in session.warnings if "ms or ns in place of us" in words]
+    assert any(flagged) == bool(told) == (unit != "us") and len(told) <= 1
+    assert not any(flagged[:50])
 
 
 def test_nwb_files_hold_the_units(url, tmp_path):

@@ -51,7 +51,8 @@ pub struct Answer {
     pub unsettled: bool,
     /// To [`Session::send_not_tracked`](crate::Session::send_not_tracked): all is zero.
     pub not_tracked: bool,
-    /// The client's clock ticks so coarsely, or stands, that rates and spikes may be far off.
+    /// The client's clock ticks so coarsely, stands, or counts ms or ns, so that rates and spikes may be far
+    /// off.
     pub coarse_clock: bool,
     /// Number of the finger.
     pub finger: u8,

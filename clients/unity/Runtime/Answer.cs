@@ -63,7 +63,7 @@ namespace Papilla
         public bool HasSummary, OutOfRange, NoContact;
         /// <summary>The frame told that nobody knows where things are (<see cref="Session.SendNotTracked"/>): all is zero.</summary>
         public bool NotTracked;
-        /// <summary>The client's clock ticks so coarsely that rates and spikes may be far off.</summary>
+        /// <summary>The client's clock ticks so coarsely, or counts ms or ns, that rates and spikes may be far off.</summary>
         public bool CoarseClock;
         /// <summary>How wrong this answer is likely to be.</summary>
         public ErrorEstimate ErrorEstimate = ErrorEstimate.Unknown;

@@ -278,6 +278,7 @@ namespace Papilla
             {
                 filling.Read(message, bytes, terms);
                 if (filling.OutOfRange && filling.Status == Status.Ok && IsNew("out_of_range")) TellPeople("pressure is beyond what the tier knows; such answers are flagged");
+                if (filling.CoarseClock && filling.Status == Status.Ok && IsNew("coarse_clock")) TellPeople("the times of the frames have steps above 20 ms, stand still, or are in ms or ns in place of us; rates, spikes and creep in such answers are wrong, and flagged coarse_clock");
                 filling.RoundTripUs = (long)(ClockUs() - filling.ClientTimeUs);
                 var answeredEvent = Answered;
                 if (answeredEvent != null) answeredEvent(filling);

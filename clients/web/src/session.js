@@ -243,8 +243,13 @@ export class Session {
   /** Says once what a program that looks at maps alone would not see. @param {Answer} answer */
   #warn(answer) {
     if (answer.status === 'error') this.#warnings.tell('error', () => `a frame was refused: ${answer.problem?.message}`);
-    else if (answer.status === 'ok' && answer.outOfRange) {
+    if (answer.status !== 'ok') return;
+    if (answer.outOfRange) {
       this.#warnings.tell('out_of_range', () => 'pressure is beyond what the tier knows; such answers are flagged');
+    }
+    if (answer.coarseClock) {
+      this.#warnings.tell('coarse_clock', () => 'the times of the frames have steps above 20 ms, stand still, or are in ms or ns '
+        + 'in place of us; rates, spikes and creep in such answers are wrong, and flagged coarse_clock');
     }
   }
 

@@ -230,7 +230,7 @@ export class Answer {
     this.cutOff = false;
     /** To a frame that told that nobody knows where things are: all is zero. */
     this.notTracked = false;
-    /** The client's clock ticks so coarsely that rates and spikes may be far off. */
+    /** The client's clock ticks so coarsely, or counts ms or ns, that rates and spikes may be far off. */
     this.coarseClock = false;
   }
 

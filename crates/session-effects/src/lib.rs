@@ -55,6 +55,7 @@ mod window;
 mod tests;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use bytes::BytesMut;
 use papilla_proto::{
@@ -68,7 +69,7 @@ use papilla_proto::{
     spikes::PlacedUnit,
 };
 
-use papilla_session_state::{Clock, Reader, StateError, Writer};
+use papilla_session_state::{Clock, Pace, Reader, StateError, Writer};
 
 pub use cost::measure;
 pub use finger::{Cost, Finger, Shared};
@@ -96,6 +97,8 @@ pub struct Effects {
     spikes: Option<(Arc<Geometry>, Spikes)>,
     /// The client's, where something goes by it.
     clock: Option<Clock>,
+    /// Whether its times are in us.
+    pace: Pace,
     /// Nobody knows what presses in this frame.
     is_lost: bool,
     margin_px: Option<u16>,
@@ -220,6 +223,7 @@ impl Effects {
             afferents,
             spikes,
             clock: has_time.then(Clock::new),
+            pace: Pace::default(),
             is_lost: false,
             margin_px,
             summary,
@@ -317,14 +321,16 @@ impl Effects {
     /// The time of the next frame, us, by which [`before`](Self::before) and [`write`](Self::write) go:
     /// the client's stamp, or, of a clock that ticks coarsely, a time within its tick.
     pub fn time_us(&mut self, stamp_us: u64) -> u64 {
-        self.clock.as_mut().map_or(stamp_us, |clock| clock.time_us(stamp_us))
+        let Some(clock) = &mut self.clock else { return stamp_us };
+        self.pace.take(stamp_us, Instant::now());
+        clock.time_us(stamp_us)
     }
 
     /// Bits of [`flags`] that tell of the client's clock.
     #[must_use]
     pub fn clock_flags(&self) -> u8 {
         let is_coarse = self.clock.as_ref().is_some_and(Clock::is_coarse);
-        if is_coarse { flags::COARSE_CLOCK } else { 0 }
+        if is_coarse || self.pace.is_of_another_unit() { flags::COARSE_CLOCK } else { 0 }
     }
 
     /// In place of [`before`](Self::before) where nobody knows what presses: the answer to this frame

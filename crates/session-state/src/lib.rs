@@ -3,7 +3,7 @@
 //! [`Writer`] and [`Reader`] turn state into bytes and back, bit by bit. [`Keys`] seals them, so that
 //! a client can neither read nor forge them, for one minute and for the same [terms](SealedFor) alone. A
 //! sealed state may be used more than once: it is the client's own. A [`Clock`] is what a session
-//! remembers of its client's.
+//! remembers of its client's, and a [`Pace`] tells whether the client counts in another unit.
 //!
 //! ```
 //! use papilla_proto::Resumption;
@@ -31,7 +31,9 @@
 mod bytes;
 mod clock;
 mod keys;
+mod pace;
 
 pub use bytes::{Reader, StateError, Writer};
 pub use clock::Clock;
 pub use keys::{KeyError, Keys, SEALED_BYTES_MAX, SealError, SealedFor, is_sealed, tier_of};
+pub use pace::Pace;

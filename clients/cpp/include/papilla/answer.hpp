@@ -60,7 +60,7 @@ struct Answer {
   bool unfamiliar = false;            ///< rougher or heavier than any map the tier was trained on
   bool unsettled = false;             ///< the contact solve did not settle: its answer is rough
   bool not_tracked = false;           ///< to `send_not_tracked`: all is zero
-  bool coarse_clock = false;          ///< the client's clock ticks so coarsely that rates and spikes may be far off
+  bool coarse_clock = false;          ///< the client's clock ticks so coarsely, or counts ms or ns, that rates and spikes may be far off
   std::uint8_t finger = 0;
   std::string tier;
   Window window{0, 0, 0, 0};          ///< of `values`

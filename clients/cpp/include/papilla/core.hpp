@@ -395,6 +395,10 @@ class Core {
     if (answer.status == Status::ok && answer.out_of_range && is_new("out_of_range")) {
       tell("pressure is beyond what tier " + answer.tier + " knows; such answers are flagged");
     }
+    if (answer.status == Status::ok && answer.coarse_clock && is_new("coarse_clock")) {
+      tell("the times of the frames have steps above 20 ms, stand still, or are in ms or ns in place of us; rates, "
+           "spikes and creep in such answers are wrong, and flagged coarse_clock");
+    }
   }
 
   /// What the service asks, and a budget that it cannot meet.

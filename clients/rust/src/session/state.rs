@@ -237,6 +237,14 @@ impl State {
                 format!("pressure is beyond what tier {tier} knows; such answers are flagged")
             });
         }
+        if answer.coarse_clock {
+            self.told.once("coarse_clock", || {
+                "the times of the frames have steps above 20 ms, stand still, or are in ms or ns in \
+                 place of us; rates, spikes and creep in such answers are wrong, and flagged \
+                 coarse_clock"
+                    .to_owned()
+            });
+        }
         // Err: nobody waits for it any more.
         let _ = pending.outcome.send(answer);
         Ok(())

@@ -461,6 +461,8 @@ func _binary(packet):
 	_flush()
 	if answer.status == "ok" and answer.out_of_range:
 		_warn("out_of_range", "pressure is beyond what the tier knows; such answers are flagged")
+	if answer.status == "ok" and answer.coarse_clock:
+		_warn("coarse_clock", "the times of the frames have steps above 20 ms, stand still, or are in ms or ns in place of us; rates, spikes and creep in such answers are wrong, and flagged coarse_clock")
 	_tell(answer)
 
 
