@@ -13,7 +13,7 @@ use std::{
 
 use papilla_fem::solve::{Options, Solver};
 use papilla_fingertip::{
-    run::{BodyFields, Explanation, Increment, Pressed, press},
+    run::{BodyFields, Explanation, Increment, Pressed, doubts, press},
     scene::{Scene as Read, SceneError},
     simulation::{Simulation, maps::FingerMaps},
 };
@@ -90,14 +90,27 @@ impl Scene {
             drop(tell.send(last));
         });
         let thread = Mutex::new(Some(thread));
-        Run { told: Mutex::new(told), stop, thread, states: Mutex::new(0) }
+        Run {
+            told: Mutex::new(told),
+            stop,
+            thread,
+            states: Mutex::new(0),
+            remarks: Mutex::default(),
+        }
     }
+}
+
+/// What was done to meshes, and what may be a mistake.
+#[derive(Clone, Default)]
+struct Remarks {
+    mended: Vec<String>,
+    doubts: Vec<String>,
 }
 
 /// What the thread that solves tells of.
 enum Told {
-    /// How many states are going to be stored.
-    States(usize),
+    /// How many states are going to be stored, and what a person should know of the scene.
+    SetUp(usize, Remarks),
     State(Box<Found>),
     End,
     Failed(Problem),
@@ -111,11 +124,13 @@ fn solve(
     tell: &SyncSender<Told>,
 ) -> Result<(), Problem> {
     let mut setup = Simulation::new(scene)?;
+    let mended = setup.approach.shape.mended();
+    let remarks = Remarks { mended, doubts: doubts(scene, &setup)? };
     let maps = FingerMaps::new(&mut setup.body)?;
     let setup = Arc::new(setup);
     let mut solver = setup.body.solver(Options::default())?;
     solver.stop_when(Some(Arc::clone(stop)));
-    if tell.send(Told::States(setup.drive.len())).is_err() {
+    if tell.send(Told::SetUp(setup.drive.len(), remarks)).is_err() {
         return Ok(());
     }
     let mut drawn = Ok(());
@@ -152,6 +167,7 @@ pub(crate) struct Run {
     thread: Mutex<Option<JoinHandle<()>>>,
     /// Found so far.
     states: Mutex<usize>,
+    remarks: Mutex<Remarks>,
 }
 
 #[pymethods]
@@ -163,7 +179,10 @@ impl Run {
         loop {
             let told = py.detach(|| lock(&self.told).recv_timeout(LOOK));
             match told {
-                Ok(Told::States(count)) => return Ok(Some((count, None))),
+                Ok(Told::SetUp(count, remarks)) => {
+                    *lock(&self.remarks) = remarks;
+                    return Ok(Some((count, None)));
+                }
                 Ok(Told::State(found)) => {
                     *lock(&self.states) = found.number + 1;
                     return Ok(Some((found.number, Some(State::new(*found)))));
@@ -179,6 +198,12 @@ impl Run {
                 }
             }
         }
+    }
+
+    /// What was done to meshes, and what may be a mistake; known once states are counted.
+    fn remarks(&self) -> (Vec<String>, Vec<String>) {
+        let Remarks { mended, doubts } = lock(&self.remarks).clone();
+        (mended, doubts)
     }
 
     /// Ends the solve within an iteration, and waits for that.

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -168,6 +169,23 @@ def test_a_mesh_from_a_file_presses_as_the_body_that_it_is(tmp_path):
     with pytest.raises(papilla.BadScene, match="cannot read") as bad:
         fe.Scene(FINGER.replace('shape = "sphere"\nradius_mm = 5.0', 'shape = "mesh"\nfile = "none.stl"'))
     assert bad.value.field == "indenter.file" and bad.value.line == 9
+
+
+def test_a_mesh_of_too_many_triangles_is_decimated_and_said(tmp_path):
+    (tmp_path / "ball.stl").write_bytes(ball_of_triangles(5.0, 6))
+    (tmp_path / "scene.toml").write_text(
+        FINGER.replace('shape = "sphere"\nradius_mm = 5.0', 'shape = "mesh"\nfile = "ball.stl"\nunit = "m"')
+    )
+    scene = fe.Scene(tmp_path / "scene.toml")
+    (said,) = scene.explain()["mended"]
+    told = re.match(r"(\d+) triangles became (\d+): the surface is at most (\S+) mm off", said)
+    before, after, off_mm = int(told[1]), int(told[2]), float(told[3])
+    # A chord of so many triangles, evenly spread, is some 0.0015 mm off.
+    assert before > 32_000 > 16_384 >= after > 16_000 and 0.0003 < off_mm < 0.01
+    mesh = scene.run(fields=False, out=tmp_path / "out")[-1]
+    assert json.loads((tmp_path / "out/summary.json").read_text())["mended"] == [said]
+    ball = fe.Scene(FINGER).run(fields=False)[-1]
+    assert mesh.force_n[2] == pytest.approx(ball.force_n[2], rel=5e-3)
 
 
 def fe_normals(atlas):

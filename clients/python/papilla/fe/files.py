@@ -52,8 +52,13 @@ class Files:
         if "fields" in self._outputs:
             state.write_vtu(self._folder / _name(state.number))
 
-    def finish(self, states: Sequence[State], reason: str | None) -> None:
-        """Writes what is of all states; `reason` says why there are no more, None where all were found."""
+    def finish(
+        self, states: Sequence[State], reason: str | None, mended: Sequence[str] = (), doubts: Sequence[str] = ()
+    ) -> None:
+        """Writes what is of all states; `reason` says why there are no more, None where all were found.
+
+        `mended` and `doubts` are what `Solve` says.
+        """
         if "fields" in self._outputs:
             self._series(states)
         if "maps" in self._outputs and states and states[0].maps:
@@ -62,6 +67,7 @@ class Files:
             with whole(self._folder / "maps.npz") as there, there.open("wb") as file:
                 np.savez_compressed(file, allow_pickle=False, **arrays)
         summary: dict[str, Any] = {"scene": self._scene, "increments": [state.summary for state in states]}
+        summary |= {name: list(said) for name, said in (("mended", mended), ("doubts", doubts)) if said}
         if reason is not None:
             summary["ended"] = reason
         with whole(self._folder / "summary.json") as there:

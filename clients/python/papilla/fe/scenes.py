@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 Field = NDArray[np.float64]
 Progress = bool | Callable[[int, int, str], None] | None
 """True draws a line on stderr; a function gets the states found, all states, and a word for people."""
+
+_LOG: Final = logging.getLogger("papilla")
 
 COMPONENTS: Final = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Order of the components of stress and strain."""
@@ -136,6 +139,10 @@ class Solve(Iterator[State]):
         self._progress = progress
         self.states = 0
         """How many states are going to be stored; known once the first is found."""
+        self.mended: list[str] = []
+        """What was done to meshes: holes closed, triangles left out; known once the first state is found."""
+        self.doubts: list[str] = []
+        """What may be a mistake in the scene, likewise."""
 
     def __next__(self) -> State:
         while True:
@@ -151,6 +158,9 @@ class Solve(Iterator[State]):
             number, state = found
             if state is None:
                 self.states = number
+                self.mended, self.doubts = self._run.remarks()
+                for said in (*self.mended, *self.doubts):
+                    _LOG.warning("%s", said)
                 self._tell("set up", 0)
                 continue
             made = State(number, state)
@@ -243,7 +253,8 @@ class Scene:
 
         With `out`, a folder, what the scene's `outputs` name is written there as `fe-datagen solve` does:
         `state-000.vtu` and so on with `series.pvd` (not with `fields=False`), `maps.npz`, and `summary.json` with
-        scene and states; no pictures. Where the solve ends early, by an error too, the states before are written.
+        scene, states, and what was mended or is in doubt; no pictures. Where the solve ends early, by an error too,
+        the states before are written.
         """
         states: dict[int, State] = {}
         files = None
@@ -253,9 +264,12 @@ class Scene:
             outputs = ["fields", "maps"] if named is None else named
             files = Files(out, members, [name for name in outputs if fields or name != "fields"])
         reason: str | None = "stopped"
+        mended: list[str] = []
+        doubts: list[str] = []
         try:
             with self.solve(fields=fields, progress=progress) as solve:
                 for state in solve:
+                    mended, doubts = solve.mended, solve.doubts
                     if state.number == 0:
                         states.clear()
                     states[state.number] = state
@@ -268,7 +282,7 @@ class Scene:
         finally:
             found = [states[number] for number in sorted(states)]
             if files is not None:
-                files.finish(found, reason)
+                files.finish(found, reason, mended, doubts)
         return found
 
     def effects(self, *, solve: bool = False, progress: Progress = None) -> list[Effect]:

@@ -168,16 +168,21 @@ impl Scene {
         let mut scene = parsed.map_err(|e| SceneError::parse(&origin, &e))?;
         scene.folder = path.parent().unwrap_or(Path::new("")).into();
         scene.origin = origin;
-        if map_pa.is_some() {
-            scene.pressure.get_or_insert_default().map_pa = map_pa;
-        }
-        if let Err(e) = scene.take_finger().and_then(|()| scene.take_meshes()) {
-            return Err(e.at(&scene));
-        }
-        match scene.validate() {
+        match scene.take(map_pa) {
             Ok(()) => Ok(scene),
             Err(e) => Err(e.at(&scene)),
         }
+    }
+
+    /// Checks it, and reads the files that it names.
+    fn take(&mut self, map_pa: Option<Arc<Vec<f32>>>) -> Result<(), SceneError> {
+        if let Some(map_pa) = map_pa {
+            self.take_map(map_pa)?;
+        }
+        self.take_finger()?;
+        self.take_meshes()?;
+        self.validate()?;
+        self.take_pressure()
     }
 
     /// Reads the finger that the geometry names; its tissues stand where the file gives none.

@@ -29,7 +29,7 @@ pub struct Pressure {
     /// Equal shares of the pressure at which the state is stored.
     #[serde(default = "one")]
     pub increments: usize,
-    /// Map that a program gives in place of a file, Pa.
+    /// The map, Pa, once the file was read, or as a program gives it in place of a file.
     #[serde(skip)]
     pub map_pa: Option<Arc<Vec<f32>>>,
 }
@@ -55,12 +55,32 @@ const PRESSURE_MAX_PA: f32 = 1e7;
 /// Largest file that is read.
 const FILE_BYTES_MAX: u64 = 1 << 30;
 
+const ONE_MAP: &str = "give one map: in a file, or by the program that runs the scene";
+
 /// A file that cannot be read.
 fn refused(message: String) -> SceneError {
     SceneError::Pressure { field: "pressure.file", message }
 }
 
 impl Scene {
+    /// Takes the map that a program gives in place of a file.
+    pub(super) fn take_map(&mut self, map_pa: Arc<Vec<f32>>) -> Result<(), SceneError> {
+        let pressure = self.pressure.get_or_insert_default();
+        if pressure.file.is_some() {
+            return Err(SceneError::Fields { field: "pressure", rule: ONE_MAP });
+        }
+        pressure.map_pa = Some(map_pa);
+        Ok(())
+    }
+
+    /// Reads the file of pressure, once for all that is done with the scene.
+    pub(super) fn take_pressure(&mut self) -> Result<(), SceneError> {
+        if let Some(pressure) = &mut self.pressure {
+            pressure.map_pa = Some(pressure.map_pa(&self.folder)?);
+        }
+        Ok(())
+    }
+
     /// Whether pressure goes with the rest of the scene.
     pub(super) fn validate_pressure(&self) -> Result<(), SceneError> {
         let Some(pressure) = &self.pressure else { return self.motion.validate() };
@@ -81,11 +101,8 @@ impl Scene {
         if !matches!(self.geometry, super::Geometry::Fingertip { .. }) {
             return fields("pressure", "needs an atlas: geometry.kind \"fingertip\"");
         }
-        if pressure.file.is_some() == pressure.map_pa.is_some() {
-            return fields(
-                "pressure",
-                "give one map: in a file, or by the program that runs the scene",
-            );
+        if pressure.file.is_none() && pressure.map_pa.is_none() {
+            return fields("pressure", ONE_MAP);
         }
         if let Some(map) = &pressure.map_pa {
             pressure.checked(map)?;

@@ -140,6 +140,14 @@ fn bad_effects_name_line_and_cure() {
             2,
             &["effects[1]", "unknown effect 'sound'; there are: finite_strain"],
         ),
+        (
+            with("[\"layers\",\n  \"frictoin\"]"),
+            2,
+            &[
+                "unknown effect 'frictoin' (was 'friction' meant?); there are: finite_strain",
+                "biphasic",
+            ],
+        ),
         (with("[\"layers\",\n  \"hyperelastic\"]"), 2, &["needs 'finite_strain'"]),
         (with("[\"viscoelastic\"]"), 1, &["motion.path"]),
         (with("[\"plane_strain\"]"), 1, &["section"]),
@@ -153,6 +161,8 @@ fn what_is_no_scene_names_line_and_cure() {
     let finger = |from: &str, to: &str| FINGER.replace(from, to);
     assert_refused(&[
         (finger("coarse", "huge"), 3, &["geometry.density", "`medium`"]),
+        (finger("coarse", "corse"), 3, &["did you mean `coarse`?"]),
+        (finger("density", "densty"), 3, &["geometry.densty", "did you mean `density`?"]),
         (finger("fingertip", "foot"), 2, &["geometry.kind", "`block`"]),
         (finger("depth_mm", "depth"), 5, &["motion.depth", "did you mean `depth_mm`"]),
         (finger("density", "dense"), 3, &["geometry.dense", "`density`"]),
@@ -206,4 +216,28 @@ fn fluid_that_cannot_flow_names_line_field_and_cure() {
         (scene(&wet, "sealed", "quadratic", "depth_mm = 1.0"), 1, &["'biphasic'", "motion.path"]),
         (with(""), 1, &["'biphasic'", "no tissue has a table"]),
     ]);
+}
+
+/// The file may go once the scene was read: nothing reads it again.
+#[test]
+fn a_file_of_pressure_is_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("press.npy");
+    let map = ndarray::Array2::from_shape_fn((224, 224), |(i, j)| {
+        if (95..115).contains(&i) && (105..130).contains(&j) { 8e3_f32 } else { 0.0 }
+    });
+    ndarray_npy::write_npy(&file, &map).unwrap();
+    let text = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\norder = \"linear\"\n[pressure]\n\
+                file = \"press.npy\"\n";
+    let path = folder.path().join("scene.toml");
+    let scene = Scene::parse(&path, text.into()).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    let pressure = scene.pressure.as_ref().unwrap();
+    let read = pressure.map_pa(&scene.folder).unwrap();
+    assert_eq!(*read, map.iter().copied().collect::<Vec<_>>());
+    assert!(!toml::to_string(&scene).unwrap().contains("map_pa"));
+    let e = Scene::parse(&path, text.into()).unwrap_err().to_string();
+    assert!(e.contains("press.npy") && e.contains(":6:"), "{e}");
+    let e = Scene::parse_under(&path, text.into(), Some(read)).unwrap_err().to_string();
+    assert!(e.contains("give one map"), "{e}");
 }
