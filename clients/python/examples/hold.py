@@ -12,7 +12,10 @@ import papilla
 
 url = os.environ.get("PAPILLA_URL", papilla.DEFAULT_URL)
 times_s = np.concatenate([np.linspace(0, 0.1, 11), np.linspace(0.15, 4.0, 78)])
-press = papilla.indentation(0, url=url).pressure_pa
+# A plate's face lies 3 mm above its origin, the pad's lowest point at z = -6.53 mm: 2 mm deep, 1.9 N.
+plate, pose = {"shape": {"shape": "plate"}}, [11.25, 0.0, -9.53 + 2.0, 0, 0, 0, 1]
+pressed = papilla.render([pose], url=url, input="objects", objects=[plate], pressure="map", map=False)
+press = pressed["pressure_pa"][0]
 frames = np.minimum(times_s / 0.1, 1.0)[:, None, None] * press
 held = {}
 for tissue in (None, "skin", "subcutaneous"):

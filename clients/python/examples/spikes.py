@@ -9,7 +9,8 @@ import papilla
 row, column = np.mgrid[:224, :224]
 shape = np.clip(1 - ((column - 118.0) ** 2 + (row - 105.0) ** 2) / 900, 0, None)
 url = os.environ.get("PAPILLA_URL", papilla.DEFAULT_URL)
-with papilla.Session(url, tier="half-space", effects=["spikes"], map=False) as session:
+hello = {"tier": "half-space", "effects": ["spikes"], "map": False}
+with papilla.local(**hello) if url == "local" else papilla.Session(url, **hello) as session:
     trains = papilla.SpikeTrains(session.ready)
     for ms in range(1000):
         # 20 kPa at most, in touch for half of each 100 ms.

@@ -11,8 +11,9 @@ import papilla
 
 url = os.environ.get("PAPILLA_URL", papilla.DEFAULT_URL)
 ball = {"shape": {"shape": "sphere", "radius_mm": 10.0}}
+hello = {"input": "objects", "objects": [ball], "pressure": "map"}
 depths_mm, forces_n = [], []
-with papilla.Session(url, input="objects", objects=[ball], pressure="map") as session:
+with papilla.local(**hello) if url == "local" else papilla.Session(url, **hello) as session:
     for step in range(11):
         depth_mm = 0.1 * step
         # The pad's lowest point is at (11.25, 0, -6.53); a ball's origin is its centre.

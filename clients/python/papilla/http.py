@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import urllib.error
 import urllib.parse
 import urllib.request
-from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any, Final, NamedTuple
 
@@ -18,7 +16,7 @@ from numpy.typing import ArrayLike
 from . import check
 from .address import Address, clean_token
 from .errors import BadInput, Refused, Unreachable
-from .model import MODELS_VARIABLE, Model
+from .model import shared
 from .wire import SIDE_PX, WHOLE, Map
 
 DEFAULT_URL: Final = "http://127.0.0.1:7224"
@@ -153,14 +151,8 @@ def sed(
         for member, value in (("finger", finger), ("budget_us", budget_us)):
             if value is not None:
                 raise BadInput(member, "a service has it; this process does not: give the address of a service")
-        return _model(tier, os.environ.get(MODELS_VARIABLE)).sed(pressure_pa, unit="Pa")
+        return shared(tier).sed(pressure_pa, unit="Pa")
     return post(pressure_pa, url=url, finger=finger, tier=tier, budget_us=budget_us, token=token).sed
-
-
-@lru_cache(maxsize=4)
-def _model(tier: str | None, models: str | None) -> Model:
-    """A network of this process, read once."""
-    return Model(tier, models=models)
 
 
 def indentation(

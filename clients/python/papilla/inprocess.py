@@ -19,7 +19,7 @@ from . import check, wire
 from .answer import Answer, Problem
 from .calls import Calls
 from .errors import Closed, Refused
-from .link import Warned, questions, told_beyond, told_refused
+from .link import TOLD_CLOCK, Warned, questions, told_beyond, told_refused
 from .model import Model
 from .rows import Rooms
 from .wire import NetForce, Window
@@ -28,7 +28,7 @@ from .wire import NetForce, Window
 _OF_CONNECTIONS: Final = ("reconnect",)
 
 
-def _solves(hello: dict[str, Any]) -> bool:
+def solves(hello: dict[str, Any]) -> bool:
     """Whether a hello needs the contact model."""
     return hello.get("input", "pressure") != "pressure" or "shear_energy" in hello.get("effects", ())
 
@@ -109,9 +109,9 @@ class LocalSession(Calls):
             return self._ready
 
     def _agree(self, hello: dict[str, Any]) -> None:
-        model, tier, solves = self._model, hello.get("tier"), _solves(hello)
-        if model is None or tier not in (None, model.tier) or (solves and not model.has_contact):
-            model = Model(tier, models=self._models, contact=solves)
+        model, tier, contact = self._model, hello.get("tier"), solves(hello)
+        if model is None or tier not in (None, model.tier) or (contact and not model.has_contact):
+            model = Model(tier, models=self._models, contact=contact)
         said = {name: value for name, value in hello.items() if name not in _OF_CONNECTIONS}
         native = model.session(said)
         self._native, self._model, self._hello = native, model, hello
@@ -224,6 +224,10 @@ class LocalSession(Calls):
         """Logs once that an answer had the flag `out_of_range`."""
         self._warned.once("out_of_range", told_beyond(self._ready["tier"]))
 
+    def warn_clock(self) -> None:
+        """Logs once that an answer had the flag `coarse_clock`."""
+        self._warned.once("coarse_clock", TOLD_CLOCK)
+
     def _next(self, client_time_us: int | None) -> tuple[int, int]:
         if self._closed:
             raise Closed("the session is closed")
@@ -240,6 +244,8 @@ class LocalSession(Calls):
         header = wire.decode(message)
         if "out_of_range" in header.flags:
             self.warn_beyond()
+        if "coarse_clock" in header.flags:
+            self.warn_clock()
         return answers.read(message, header, self._ready, self._ready["tier"])
 
 

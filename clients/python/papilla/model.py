@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -141,3 +142,21 @@ class Model:
     def session(self, hello: dict[str, Any]) -> _native.Session:
         """A session of the native module; `papilla.local` makes a session for people of it."""
         return self._native.session(wire.hello(hello))
+
+
+def shared(tier: str | None = None, *, contact: bool = False) -> Model:
+    """The network for calls with `url="local"`, read by the first of them.
+
+    It is read anew where the folder of models is another one, or its index has changed. Raises as `Model`.
+    """
+    models = folder(None).absolute()
+    try:
+        changed = (models / "index.json").stat().st_mtime_ns
+    except OSError:
+        changed = 0  # The native module says what is wrong.
+    return _read(tier, models, changed, contact)
+
+
+@lru_cache(maxsize=4)
+def _read(tier: str | None, models: Path, changed: int, contact: bool) -> Model:
+    return Model(tier, models=models, contact=contact)

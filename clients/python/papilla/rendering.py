@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 
 from .errors import BadInput
 from .http import DEFAULT_URL, LOCAL
+from .model import shared
 from .send_series import LANES_MAX, Progress, Source, Terms, parts
 from .series import Series, joined
 from .sync import Session
 
 if TYPE_CHECKING:
-    from .calls import Calls
     from .inprocess import LocalSession
 
 
@@ -53,7 +53,7 @@ def _rendered(
             lanes = 1 if source.remembers else max(1, min(LANES_MAX, os.cpu_count() or 1, source.count or LANES_MAX))
         elif lanes < 1 or (lanes > 1 and source.remembers):
             raise BadInput("lanes", f"{lanes}; a series whose frames depend on those before goes over one")
-        others = [_opened(url, token, hello, first) for _ in range(lanes - 1)]
+        others = [_opened(url, token, hello) for _ in range(lanes - 1)]
         try:
             yield from parts([first, *others], source, source.count or 256 if chunk is None else chunk, progress)
         finally:
@@ -61,13 +61,13 @@ def _rendered(
                 session.close()
 
 
-def _opened(url: str, token: str | None, hello: dict[str, Any], like: Calls | None = None) -> Session | LocalSession:
-    """A session with a service, or, at the address `local`, in this process, which shares a network with another."""
+def _opened(url: str, token: str | None, hello: dict[str, Any]) -> Session | LocalSession:
+    """A session with a service, or, at the address `local`, in this process, with the network of all calls there."""
     if url != LOCAL:
         return Session(url, token, **hello)
-    from .inprocess import LocalSession
+    from .inprocess import LocalSession, solves
 
-    return LocalSession(like.model if isinstance(like, LocalSession) else None, **hello)
+    return LocalSession(shared(hello.get("tier"), contact=solves(hello)), **hello)
 
 
 def render(

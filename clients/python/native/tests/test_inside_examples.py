@@ -33,6 +33,26 @@ def test_finger(example, tmp_path):
     assert len((tmp_path / "force.csv").read_text().splitlines()) == 10
 
 
+def test_touch(example):
+    forces_n = example("touch")["forces_n"]
+    assert forces_n[0] == 0.0 and (np.diff(forces_n) > 0).all() and forces_n[-1] > 0.2
+
+
+def test_hold(example):
+    found = example("hold")
+    sed = {tissue: series["summary_sed_max_j_per_m3"] for tissue, series in found["held"].items()}
+    # Once the pressure stands, only tissue that relaxes goes on yielding.
+    assert np.ptp(sed[None][10:]) < 1e-3 * sed[None][10]
+    assert all((np.diff(sed[tissue][10:]) >= 0).all() for tissue in ("skin", "subcutaneous"))
+    assert found["share"] > 5 and 1e4 < found["press"].max() < 1e5
+
+
+def test_spikes(example):
+    trains = example("spikes")["trains"]
+    taps = np.histogram(trains.time_us, np.arange(0, 1_100_000, 100_000))[0]
+    assert (taps > 20).all() and trains.lost == 0
+
+
 def test_own_pressure(example, tmp_path):
     found = example("own_pressure")
     assert abs(found["state"].force_n[2] - 0.1) < 0.02

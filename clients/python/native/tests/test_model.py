@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import papilla
+from papilla.model import folder
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +63,37 @@ def test_the_short_call_needs_no_service(model, pressure_pa):
     for member in ("finger", "budget_us"):
         with pytest.raises(papilla.BadInput, match=f"{member}: a service has it"):
             papilla.sed(pressure_pa, url="local", **{member: 1})
+
+
+def test_calls_in_this_process_read_a_network_once(monkeypatch, tmp_path, pressure_pa):
+    for file in folder(None).iterdir():
+        if file.name == "index.json":
+            (tmp_path / file.name).write_bytes(file.read_bytes())
+        else:
+            (tmp_path / file.name).symlink_to(file.absolute())
+    monkeypatch.setenv("PAPILLA_MODELS", str(tmp_path))
+    made, read = papilla.Model.__init__, []
+
+    def counted(self, tier=None, **more):
+        read.append(tier)
+        made(self, tier, **more)
+
+    monkeypatch.setattr(papilla.Model, "__init__", counted)
+    frames = np.stack([pressure_pa, 0.5 * pressure_pa])
+    first = papilla.render(frames, url="local", tier="nano").sed
+    for lanes in (1, 2):
+        assert np.array_equal(papilla.render(frames, url="local", tier="nano", lanes=lanes).sed, first)
+    assert np.array_equal(papilla.sed(pressure_pa, url="local", tier="nano"), first[0])
+    assert read == ["nano"]
+    ball = {"shape": {"shape": "sphere", "radius_mm": 8.0}}
+    for _ in range(2):
+        papilla.render([[[11.25, 0, -14.2, 0, 0, 0, 1]]], url="local", input="objects", objects=[ball])
+    assert read == ["nano", None]
+    # Networks that were trained anew are not mistaken for the old ones.
+    index = tmp_path / "index.json"
+    os.utime(index, ns=(0, index.stat().st_mtime_ns + 1_000_000))
+    papilla.sed(pressure_pa, url="local", tier="nano")
+    assert read == ["nano", None, "nano"]
 
 
 def test_bad_folders_are_named(tmp_path):
