@@ -76,4 +76,4 @@ pub use object::Object;
 pub use objects::Scene;
 pub use pixels::{PixelContact, PixelMemory, PixelSkin, PixelSpacing};
 pub use shear_energy::{InterfaceSkin, ShearEnergy};
-pub use solver::{Anchor, Memory, Settings, Side, Solver};
+pub use solver::{Anchor, Hardest, Memory, Settings, Side, Solver};

@@ -1,6 +1,6 @@
 //! The warm start of a finger's solver as bytes.
 
-use papilla_contact::{Anchor, Memory, PixelMemory, Side};
+use papilla_contact::{Anchor, Hardest, Memory, PixelMemory, Side};
 use papilla_session_state::{Reader, StateError, Writer};
 
 /// More vertices than any patch holds, and than a map has pixels: what a damaged count can make the
@@ -30,8 +30,10 @@ fn write_sides(sides: &[Side], state: &mut Writer) {
             }
         }
         state.option(witness.map(u64::from));
-        for i in 0..4 {
-            state.option(hardest.map(|v| v[i].to_bits()));
+        state.number(u64::from(hardest.is_some()));
+        if let Some(Hardest { origin_mm, rotation, force_n }) = hardest {
+            let values = origin_mm.iter().chain(rotation.as_flattened()).chain([force_n]);
+            values.for_each(|value| state.number(value.to_bits()));
         }
         state.number(u64::from(*is_held) + 2 * u64::from(*is_guess));
     }
@@ -51,12 +53,14 @@ fn read_sides(state: &mut Reader<'_>) -> Result<Vec<Side>, StateError> {
         }
         let [way, origin_mm] = vectors;
         let witness = state.option()?.map(|vertex| vertex.min(u64::from(u32::MAX)) as u32);
-        let mut hardest = Some([0.0; 4]);
-        for i in 0..4 {
-            match (state.option()?, &mut hardest) {
-                (Some(bits), Some(v)) => v[i] = f64::from_bits(bits),
-                _ => hardest = None,
+        let mut hardest = None;
+        if state.count(1, "a place of greatest force")? == 1 {
+            let mut values = [0.0; 13];
+            for value in &mut values {
+                *value = f64::from_bits(state.number()?);
             }
+            let [origin_mm, a, b, c] = [0, 3, 6, 9].map(|at| [0, 1, 2].map(|i| values[at + i]));
+            hardest = Some(Hardest { origin_mm, rotation: [a, b, c], force_n: values[12] });
         }
         let bits = state.count(3, "how an object is held")?;
         let (is_held, is_guess) = (bits & 1 != 0, bits & 2 != 0);

@@ -2,8 +2,10 @@
 
 use super::options::ContactOf;
 use super::{load_model, print_json};
+use papilla_dataset::Split;
 use papilla_engine::Backend;
 use papilla_model_export::contact::{Models, Row, Rung, errors_of, measure};
+use papilla_model_export::split::SplitOrAll;
 use papilla_model_export::{ExportError, evaluate};
 use papilla_progress::Progress;
 use std::path::PathBuf;
@@ -22,6 +24,9 @@ pub(crate) struct Options {
     /// Measure this method alone, such as "second order, pixels"; may be given several times.
     #[arg(long = "method", value_name = "NAME", value_parser = rung)]
     methods: Vec<Rung>,
+    /// Which indentations are taken: 'test', 'train' (to choose by) or 'all'.
+    #[arg(long, default_value_t = SplitOrAll::Split(Split::Test), value_name = "PART")]
+    split: SplitOrAll,
     /// Take one state of so many.
     #[arg(long, default_value_t = 1, value_name = "N")]
     every: usize,
@@ -60,7 +65,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         }
         for &rung in rungs {
             let session = session.as_deref_mut();
-            rows.push(measure(&models, rung, &dataset, session, options.every)?);
+            rows.push(measure(&models, rung, &dataset, session, (options.split, options.every))?);
             progress.inc();
         }
     }
@@ -76,9 +81,9 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         return print_json(&rows);
     }
     println!(
-        "| method | set | pressure, % | force, % | SED, % | first frame, us | next frame, us | 1 um aside, % | flagged |"
+        "| method | set | pressure, % | force, % | force across, % | SED, % | first frame, us | next frame, us | 1 um aside, % | flagged |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     rows.iter().for_each(print_row);
     println!(
         "\nRelative L2 against FE and processor time, median / 95th percentile; by how much 1 um sideways changes \
@@ -92,11 +97,12 @@ fn print_row(row: &Row) {
     let us = |[median, p95]: [f64; 2]| format!("{median:.0} / {p95:.0}");
     let [unsettled, outside, all] = row.told;
     println!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {unsettled} + {outside} of {all} |",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {unsettled} + {outside} of {all} |",
         row.rung,
         row.set,
         percent(row.pressure),
         percent(row.force),
+        percent(row.across),
         row.sed.map_or_else(|| "-".to_owned(), percent),
         us(row.cold_us),
         us(row.warm_us),

@@ -10,12 +10,13 @@ pub(crate) use self::placed::Placed;
 pub use self::pseudo_labels::{Labeller, PseudoLabels};
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile, relative_l2};
+use crate::split::SplitOrAll;
 use crate::{ExportError, read};
 use papilla_contact::{
     Contact, ContactModel, Gaps, Method, Object, PixelContact, PixelSkin, PixelSpacing, Scene,
     Settings, Solver,
 };
-use papilla_dataset::{IndentationEntry, Shard, Split, sha256_hex};
+use papilla_dataset::{IndentationEntry, Shard, sha256_hex};
 use papilla_engine::{MAP_LEN, Session};
 use papilla_processor::thread_s;
 use papilla_proto::atlas::Patch;
@@ -111,6 +112,8 @@ pub struct Row {
     pub pressure: [f64; 2],
     /// Relative error of the size of the force.
     pub force: [f64; 2],
+    /// The part of the force that is across the due one, over its size.
+    pub across: [f64; 2],
     /// Relative L2 of the SED map that a network makes of the pressure, with a network.
     pub sed: Option<[f64; 2]>,
     /// Processor time of a frame from nothing, us.
@@ -198,7 +201,7 @@ impl Models {
     }
 }
 
-/// Measures a rung on the held-out indentations of a dataset, every `every`th state.
+/// Measures a rung on a part of a dataset, every `every`th state.
 ///
 /// # Errors
 /// [`ExportError`] of the dataset or the network.
@@ -207,7 +210,7 @@ pub fn measure(
     rung: Rung,
     dataset: &Dataset,
     network: Option<&mut (dyn Session + '_)>,
-    every: usize,
+    (part, every): (SplitOrAll, usize),
 ) -> Result<Row, ExportError> {
     let mut network = network;
     let mut figures = Figures::default();
@@ -222,7 +225,7 @@ pub fn measure(
     }
     let mut out = Contact::new(models.finger.vertices());
     let mut count = 0;
-    for indentation in dataset.indentations(Split::Test)? {
+    for indentation in dataset.indentations(part)? {
         let shard = dataset.shard(indentation)?;
         let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
         for state in 0..indentation.samples {
@@ -278,6 +281,7 @@ pub(crate) fn pixel_contact(
 struct Figures {
     pressure: Vec<f64>,
     force: Vec<f64>,
+    across: Vec<f64>,
     sed: Vec<f64>,
     cold_us: Vec<f64>,
     warm_us: Vec<f64>,
@@ -349,8 +353,12 @@ impl Figures {
         }
         dataset.draw_pressure(indentation, shard, state, &mut truth)?;
         self.pressure.extend(relative_l2(&pressure_pa, &truth));
-        let due = norm([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
+        let due_n = [0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]]));
+        let due = norm(due_n);
         self.force.push((norm(out.force_n) / due - 1.0).abs());
+        let along: f64 = (0..3).map(|i| out.force_n[i] * due_n[i]).sum::<f64>() / due.powi(2);
+        let across = norm([0, 1, 2].map(|i| out.force_n[i] - along * due_n[i])) / due;
+        self.across.push(across);
         self.told[0] += usize::from(!out.quality.settled);
         self.told[1] += usize::from(out.quality.out_of_range);
         self.told[2] += 1;
@@ -370,6 +378,7 @@ impl Figures {
             set: set.to_owned(),
             pressure: both(&self.pressure),
             force: both(&self.force),
+            across: both(&self.across),
             sed: (!self.sed.is_empty()).then(|| both(&self.sed)),
             cold_us: both(&self.cold_us),
             warm_us: both(&self.warm_us),

@@ -195,6 +195,7 @@ impl PixelContact {
             self.end_round(effort);
             return Ok(());
         }
+        window.turn_to_skin(&pressure[..n]);
         let gradient = &mut rest[..m];
         window.gradient([&pressure[..m], &of_vertices[..m]], gradient);
         let [give, ease] = [&window.give[..m], &window.ease[..m]];

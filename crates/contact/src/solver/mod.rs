@@ -20,6 +20,7 @@ use crate::error::ContactError;
 use crate::gaps::Field;
 use crate::ladder::Method;
 use crate::model::{ContactModel, Header};
+use crate::object::Object;
 use crate::objects::{Scene, Things, View, validate};
 use crate::patch::{Patch, Slots};
 use crate::second_order::Amplitudes;
@@ -29,8 +30,8 @@ pub use friction::Anchor;
 use friction::Friction;
 pub use memory::Memory;
 use papilla_vector::norm;
-pub use sides::Side;
 use sides::Sides;
+pub use sides::{Hardest, Side};
 use std::sync::Arc;
 
 /// Undeformed vertices nearer than this may come into contact, reference mm.
@@ -295,7 +296,10 @@ impl Solver {
     /// so are bodies that lie in the finger although none is met.
     pub(crate) fn end_frame(&mut self, view: View<'_>, is_met: bool, out: &mut Contact) {
         self.tell_missed(view, is_met, out);
-        out.quality.has_faded = self.sides.has_faded(out.force_n, out.quality.settled);
+        if let Things::Objects([Object { placement, .. }]) = view.things {
+            let (turned, settled) = (placement.rotation, out.quality.settled);
+            out.quality.has_faded = self.sides.has_faded(turned, out.force_n, settled);
+        }
         out.quality.settled &= !out.quality.has_faded;
         self.follow_slip(view);
     }

@@ -3,8 +3,9 @@
 
 use crate::deep::{Pressed, Way, skin};
 use crate::support::{Finger, Throw};
-use papilla_contact::{Method, Object, PixelSpacing, Quality};
-use papilla_sdf::{Cylinder, Placement, RoundedPlate, SignedDistance, Sphere};
+use papilla_atlas::{Atlas, Patch, Raster};
+use papilla_contact::{Arrays, Method, Object, PixelSkin, PixelSpacing, Quality};
+use papilla_sdf::{Cylinder, Grating, Placement, RoundedPlate, SignedDistance, Sphere, Wedge};
 use std::sync::Arc;
 
 type Shape = (Arc<dyn SignedDistance>, f64);
@@ -113,6 +114,85 @@ fn an_edge_in_the_plane_of_symmetry_pushes_nothing_aside_silently() {
     }
     println!("{told} of {all} are flagged");
     assert!(told > 0);
+}
+
+/// A blade, and the edge of a block, that pass over the finger's plane of symmetry: on pixels their force
+/// goes along the skin's normal, is none across the plane when they are in it, and has no jumps.
+#[test]
+fn on_pixels_a_sharp_edge_pushes_along_the_skin() {
+    let finger = Finger::new();
+    let skin = skin(&finger);
+    let lowest = finger.places_mm[finger.lowest()];
+    let block = RoundedPlate { half_mm: [4.0; 3], edge_radius_mm: 0.02 };
+    let shapes: [(Arc<dyn SignedDistance>, f64); 2] =
+        [(Arc::new(Wedge::default()), 0.0), (Arc::new(block), 45.0)];
+    for (shape, turned_deg) in shapes {
+        let turn = Placement::turned(turned_deg, 0.0, 0.0, [0.0; 3]);
+        let top = shape.reach_mm([0, 1, 2].map(|i| turn.rotation[2][i]));
+        for (way, depth_mm) in WAYS[1..].iter().flat_map(|w| [0.4, 0.9].map(|d| (*w, d))) {
+            let mut pressed = Pressed::new(&finger, &skin, way);
+            let mut last: Option<[f64; 3]> = None;
+            for step in -15..=10 {
+                let y = 0.02 * f64::from(step);
+                let origin_mm = [lowest[0], y, lowest[2] + depth_mm - top];
+                pressed.press(&[Object::rigid(shape.clone(), Placement { origin_mm, ..turn })]);
+                let force_n = pressed.out.force_n;
+                let told = format!("{way:?}, {depth_mm} mm, {y}: {force_n:?}, before {last:?}");
+                assert!(!pressed.out.quality.is_aside, "{told}");
+                assert!(step != 0 || force_n[1].abs() < 0.05 * force_n[2], "{told}");
+                assert!(force_n[1].abs() < 0.15 * force_n[2], "{told}");
+                // The first frames come from nothing.
+                if let (Some(last), true) = (last, step > -10) {
+                    let by = size([0, 1, 2].map(|i| force_n[i] - last[i]));
+                    assert!(by < 0.15 * size(force_n), "jumps: {told}");
+                }
+                last = Some(force_n);
+            }
+        }
+    }
+}
+
+/// Where ridges of a fine grating lie between the vertices, methods at vertices press far too little: that is
+/// told, and nothing of the kind is told of a plate.
+#[test]
+fn what_lies_between_vertices_is_told() {
+    let read = |name: &str| {
+        std::fs::read(format!("{}/../../models/{name}", env!("CARGO_MANIFEST_DIR")))
+            .expect("a file")
+    };
+    let finger = Finger::of(Arrays::read(&read("finger.contact")).expect("a model"));
+    let atlas = String::from_utf8(read("atlas.json")).expect("text");
+    let atlas = Atlas::from_json(&atlas).expect("an atlas");
+    let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
+    let skin = Arc::new(PixelSkin::new(&finger.model, &atlas, raster).expect("layers"));
+    let fine = |ridge_mm: f64| -> Shape {
+        let groove_mm = 0.9 - ridge_mm;
+        let of = Grating { ridges: 12, ridge_mm, groove_mm, height_mm: 1.5, ..Grating::default() };
+        (Arc::new(Grating { edge_radius_mm: 0.02, ..of }), 0.0)
+    };
+    let plate = plate([10.0, 10.0, 3.0], 1.0);
+    let (mut weak, mut all) = (0, 0);
+    for (shape, is_fine) in [(&fine(0.3), true), (&plate, false)] {
+        for (spin_deg, depth_mm) in
+            [0.0, 20.0, 40.0, 70.0, 90.0].into_iter().flat_map(|spin| [(spin, 0.4), (spin, 0.7)])
+        {
+            let throw = Throw { vertex: finger.lowest(), depth_mm, tilt_deg: [3.0, 0.0], spin_deg };
+            let object = [finger.place(shape, throw)];
+            let [rough, exact] = [WAYS[0], WAYS[2]].map(|way| {
+                let mut pressed = Pressed::new(&finger, &skin, way);
+                pressed.press(&object);
+                pressed
+            });
+            let [rough_n, exact_n] = [&rough, &exact].map(|pressed| size(pressed.out.force_n));
+            let told = format!("{throw:?}: {rough_n} N, {exact_n} N, {:?}", rough.out.quality);
+            assert!(rough_n > 0.6 * exact_n || rough.is_told(), "silent: {told}");
+            assert!(is_fine || !rough.is_told(), "a plate: {told}");
+            weak += usize::from(is_fine && rough_n < 0.6 * exact_n);
+            all += usize::from(is_fine && rough.is_told());
+        }
+    }
+    println!("{weak} of 10 press too little, {all} are flagged");
+    assert!(weak > 0);
 }
 
 /// What is blunt is not taken for an edge or for something missed, in the air, at its first touch and

@@ -101,7 +101,8 @@ fn objects_that_touch_press_as_one() {
     for (way, count) in WAYS.iter().zip(counts) {
         println!("{way:?}: {count:?}");
         let Count { frames, told: [one, some], other: [moved, apart] } = count;
-        assert!(frames > 500 && 2 * some < frames, "{way:?}: {count:?}");
+        // Methods at vertices tell that most of these are too narrow for them.
+        assert!(frames > 500 && 10 * some < 9 * frames, "{way:?}: {count:?}");
         assert!(some <= one + frames / 20, "{way:?}: {count:?}");
         assert!(apart <= moved + moved / 4 + frames / 40, "{way:?}: {count:?}");
     }

@@ -1,6 +1,7 @@
 //! The window: the part of the skin near objects, its pixels, and the vertices that move them.
 
 mod close;
+mod creases;
 mod gaps;
 mod hats;
 mod known;
@@ -38,6 +39,8 @@ pub(super) struct Window {
     /// Slots of the pixels above, below, before and after each.
     pub beside: Vec<[u32; 4]>,
     pub at_mm: Vec<[f32; 3]>,
+    /// Directions of the force of their pressure: the object's normal, or that of the skin as far as the
+    /// object does not lie across it.
     pub normal: Vec<[f32; 3]>,
     pub area_mm2: Vec<f32>,
     /// The skin's normal, into the finger.

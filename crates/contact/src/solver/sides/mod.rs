@@ -21,6 +21,7 @@ use crate::held::Held;
 use crate::model::ContactModel;
 use crate::object::Object;
 use crate::objects::{Things, View};
+pub use fading::Hardest;
 use joined::Joined;
 use look::Asked;
 use papilla_vector::{dot, norm};
@@ -47,8 +48,8 @@ pub struct Side {
     pub is_held: bool,
     /// Whether its way is a guess.
     pub is_guess: bool,
-    /// Where it was when it pressed hardest on a straight way in, reference mm, and that force, N.
-    pub hardest: Option<[f64; 4]>,
+    /// Where it pressed hardest on a straight way in.
+    pub hardest: Option<Hardest>,
 }
 
 /// What vertices at rest say of one object or body.
@@ -129,7 +130,7 @@ impl Sides {
             side.way.is_none_or(is_unit)
                 && (side.way.is_some() || !side.is_held)
                 && side.origin_mm.is_none_or(|o| o.iter().all(|v| v.is_finite()))
-                && side.hardest.is_none_or(|h| h.iter().all(|v| v.is_finite()))
+                && side.hardest.is_none_or(|hardest| hardest.is_finite())
         };
         self.kept.clear();
         self.kept.extend_from_slice(sides);
