@@ -5,8 +5,10 @@ build) and PAPILLA_SERVER set. One build serves all of them, with what is option
 """
 
 import os
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 from needs import (
     AS_ROOT,
@@ -476,5 +478,8 @@ def extent(name: str) -> list[Step]:
     form, documents, build, *checks = fast()
     if name == "fast":
         return fast()
+    if shutil.which("c++") is None:
+        # One of the crates compiles C++.
+        build = replace(build, after=(*build.after, "packages"))
     steps = [form, documents, build, *installs(), *checks, *full()]
     return steps + long() if name == "all" else steps
