@@ -14,7 +14,7 @@
 use super::Window;
 
 /// One less the cosine between the normals of object and skin, as a mean over the force, from which on the
-/// skin begins to tell the direction, and from which on it alone does. Pixels under plates, pens and balls of 2 mm
+/// skin begins to tell the direction, and from which on it alone does. Pixels under plates, pens and balls of 3 mm
 /// and more stay below the first.
 const SHARP: [f32; 2] = [0.1, 0.2];
 
