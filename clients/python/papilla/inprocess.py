@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import Future
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
 
@@ -33,6 +34,20 @@ def solves(hello: dict[str, Any]) -> bool:
     return hello.get("input", "pressure") != "pressure" or "shear_energy" in hello.get("effects", ())
 
 
+def _suits(model: Model, asked: str | None, tier: str | None, contact: bool) -> bool:
+    """Whether a model that was read for `asked` has the network that a hello gets at a service."""
+    has_network = asked is None if tier is None else tier in model.tiers
+    return has_network and (model.has_contact or not contact)
+
+
+def _named(hello: dict[str, Any]) -> set[str]:
+    """Names of the fingers that a hello announces, but for the default one."""
+    fingers = hello.get("fingers")
+    announced = fingers if isinstance(fingers, list | tuple) else []
+    names = {finger.get("name") for finger in announced if isinstance(finger, dict)}
+    return {name for name in names if isinstance(name, str) and name != "default"}
+
+
 class LocalSession(Calls):
     """As `Session`, without a service: frames are rendered on the thread that sends them.
 
@@ -40,9 +55,18 @@ class LocalSession(Calls):
     """
 
     def __init__(
-        self, model: Model | None = None, *, models: str | os.PathLike[str] | None = None, **hello: Any
+        self,
+        model: Model | None = None,
+        *,
+        models: str | os.PathLike[str] | None = None,
+        bundles: str | os.PathLike[str] | None = None,
+        **hello: Any,
     ) -> None:
         self.url = "local"
+        self._bundles = None if bundles is None else Path(bundles)
+        # By the names of their fingers, with the tier that they were read for.
+        self._named: dict[str, tuple[str | None, Model]] = {}
+        self._asked: str | None = None
         self.timeout_s = float("inf")
         self._models = models if model is None else model.folder
         self._model = model
@@ -109,15 +133,30 @@ class LocalSession(Calls):
             return self._ready
 
     def _agree(self, hello: dict[str, Any]) -> None:
-        model, tier, contact = self._model, hello.get("tier"), solves(hello)
-        if model is None or tier not in (None, model.tier) or (contact and not model.has_contact):
-            model = Model(tier, models=self._models, contact=contact)
+        model, asked, tier, contact = self._model, self._asked, hello.get("tier"), solves(hello)
+        if model is None or not _suits(model, asked, tier, contact):
+            model, asked = Model(tier, models=self._models, contact=contact), tier
         said = {name: value for name, value in hello.items() if name not in _OF_CONNECTIONS}
-        native = model.session(said)
-        self._native, self._model, self._hello = native, model, hello
+        named = self._load(_named(hello), tier, contact)
+        native = model.session(said, {name: of for name, (_, of) in named.items()})
+        self._native, self._model, self._asked, self._named, self._hello = native, model, asked, named, hello
         self._ready: dict[str, Any] = json.loads(native.ready())
+        self._tiers = dict(enumerate(self._ready.get("tier_names") or [self._ready["tier"]]))
         for words in questions(self._ready):
             self._warned.once(words, words)
+
+    def _load(self, names: set[str], tier: str | None, contact: bool) -> dict[str, tuple[str | None, Model]]:
+        """The models of fingers by name, as far as they have a folder; the rest is refused with the hello."""
+        loaded = {}
+        for name in sorted(names):
+            at = self._bundles / name if self._bundles is not None and Path(name).name == name else None
+            if at is None or not at.is_dir():
+                continue
+            known = self._named.get(name)
+            if known is None or not _suits(known[1], known[0], tier, contact):
+                known = tier, Model(tier, models=at, contact=contact)
+            loaded[name] = known
+        return loaded
 
     def send(
         self,
@@ -246,7 +285,7 @@ class LocalSession(Calls):
             self.warn_beyond()
         if "coarse_clock" in header.flags:
             self.warn_clock()
-        return answers.read(message, header, self._ready, self._ready["tier"])
+        return answers.read(message, header, self._ready, self._tiers[header.tier])
 
 
 def _done(answer: Answer) -> Future[Answer]:
@@ -261,13 +300,21 @@ def _bytes(samples: NDArray[Any]) -> bytes | memoryview:
     return np.ascontiguousarray(samples).data.cast("B") if samples.size else b""
 
 
-def local(model: Model | None = None, *, models: str | os.PathLike[str] | None = None, **hello: Any) -> LocalSession:
+def local(
+    model: Model | None = None,
+    *,
+    models: str | os.PathLike[str] | None = None,
+    bundles: str | os.PathLike[str] | None = None,
+    **hello: Any,
+) -> LocalSession:
     """A session in this process, with the methods and the answers of `Session(url)`.
 
     `with papilla.local() as session: session.render(pressure_pa).sed`
 
-    `models` is a folder of models, by default that of the wheel; `model` is one that is loaded already. The
-    rest are members of the hello, as for `Session`; `budget_us`, `stale_after_us` and `resume` are refused,
-    because nothing waits or travels here. Raises Refused, BadModels and NativeMissing.
+    `models` is a folder of models, by default that of the wheel; `model` is one that is loaded already.
+    `bundles` has a folder for each further finger that the hello may name, as that of `papilla-server --fingers`;
+    each needs networks of its own. The rest are members of the hello, as for `Session`; `budget_us`,
+    `stale_after_us` and `resume` are refused, because nothing waits or travels here. Raises Refused, BadModels and
+    NativeMissing.
     """
-    return LocalSession(model, models=models, **hello)
+    return LocalSession(model, models=models, bundles=bundles, **hello)

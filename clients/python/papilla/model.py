@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -89,6 +90,11 @@ class Model:
         return self._native.name
 
     @property
+    def tiers(self) -> list[str]:
+        """Names of the networks that were read: for poses and gaps, and for pressure."""
+        return self._native.names
+
+    @property
     def atlas_hash(self) -> str:
         """Hash of the atlas that its maps are drawn by."""
         return self._native.atlas_hash
@@ -139,9 +145,12 @@ class Model:
         flags = np.frombuffer(self._native.sed(list(batch), list(room), threads), np.uint8)
         return Rendered(sed, flags if is_batch else flags[0])
 
-    def session(self, hello: dict[str, Any]) -> _native.Session:
-        """A session of the native module; `papilla.local` makes a session for people of it."""
-        return self._native.session(wire.hello(hello))
+    def session(self, hello: dict[str, Any], fingers: Mapping[str, Model] | None = None) -> _native.Session:
+        """A session of the native module; `papilla.local` makes a session for people of it.
+
+        `fingers` are the models of the fingers that the hello may name.
+        """
+        return self._native.session(wire.hello(hello), [(name, of._native) for name, of in (fingers or {}).items()])
 
 
 def shared(tier: str | None = None, *, contact: bool = False) -> Model:

@@ -42,7 +42,7 @@ impl Contact {
     /// # Errors
     /// A member is unusable or missing; the problem names it.
     pub fn open(bundle: &Arc<Bundle>, hello: &Hello) -> Result<Self, Problem> {
-        hello::check_form(hello)?;
+        hello::check_form(hello, &[])?;
         let hand = Hand::of(hello, bundle.skin())?;
         if hand.method().is_none() {
             let message = "pressure that is known needs no contact; 'objects' or 'gaps' is due";

@@ -42,7 +42,7 @@ impl Feel {
     /// # Errors
     /// A member is unusable, or an effect needs a network; the problem names it.
     pub fn open(bundle: &Arc<Bundle>, hello: &Hello) -> Result<Self, Problem> {
-        hello::check_form(hello)?;
+        hello::check_form(hello, &[])?;
         if let Some(name) = hello.effects.iter().find(|name| name.parse::<RuntimeEffect>().is_err())
         {
             return Err(unknown_effect(name, None));

@@ -3,9 +3,12 @@
 use std::sync::Arc;
 
 use papilla_proto::{
-    ClientMessage, ErrorCode, Hello, Problem, RuntimeEffect, contact::DEFAULT_FINGER,
-    error::shortened, unknown_effect,
+    ClientMessage, ErrorCode, Hello, Problem, RuntimeEffect,
+    contact::{DEFAULT_FINGER, FINGERS_MAX},
+    error::shortened,
+    unknown_effect,
 };
+use papilla_session_contact::of_finger;
 
 use crate::{Model, Network};
 
@@ -22,8 +25,8 @@ pub fn read_hello(text: &str) -> Result<Hello, Problem> {
     Ok(hello)
 }
 
-/// What a network or a queue is asked for has no meaning here.
-pub(crate) fn check_form(hello: &Hello) -> Result<(), Problem> {
+/// What a network or a queue is asked for has no meaning here, and fingers have the names of models.
+pub(crate) fn check_form(hello: &Hello, named: &[(String, Arc<Model>)]) -> Result<(), Problem> {
     hello.check_version()?;
     for (is_there, member) in [
         (hello.budget_us.is_some(), "budget_us"),
@@ -36,11 +39,14 @@ pub(crate) fn check_form(hello: &Hello) -> Result<(), Problem> {
         }
     }
     for (number, finger) in hello.fingers.iter().flatten().enumerate() {
-        if finger.name() != DEFAULT_FINGER {
-            let name = shortened(finger.name());
+        let is_there = |name: &str| named.iter().any(|(known, _)| known == name);
+        if finger.name() != DEFAULT_FINGER && !is_there(finger.name()) {
+            let known = named.iter().map(|(known, _)| known.as_str());
+            let known: Vec<&str> = std::iter::once(DEFAULT_FINGER).chain(known).collect();
             let message = format!(
-                "no finger '{name}': the library has the one finger whose folder was loaded; load \
-                 that of '{name}', and leave 'name' out"
+                "no finger '{}' was loaded, only {}",
+                shortened(finger.name()),
+                known.join(", ")
             );
             let field = format!("fingers[{number}].name");
             return Err(Problem::new(ErrorCode::BadContact, message).at(field));
@@ -51,6 +57,28 @@ pub(crate) fn check_form(hello: &Hello) -> Result<(), Problem> {
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
     Ok(())
+}
+
+/// The model of each finger of a hello, at least of one.
+pub(crate) fn models<'a>(
+    hello: &Hello,
+    default: &'a Arc<Model>,
+    named: &'a [(String, Arc<Model>)],
+) -> Vec<&'a Arc<Model>> {
+    let announced = hello.fingers.iter().flatten().take(FINGERS_MAX);
+    let of_name = |name: &str| named.iter().find(|(known, _)| known == name).map(|(_, of)| of);
+    let models: Vec<_> = announced.map(|one| of_name(one.name()).unwrap_or(default)).collect();
+    if models.is_empty() { vec![default] } else { models }
+}
+
+/// The problem of a finger whose answers would be laid out otherwise than those of the first.
+pub(crate) fn other_sections(hello: &Hello, number: usize) -> Problem {
+    let message = "answers would be laid out otherwise than those of fingers[0], since its atlas has \
+                   not as many vertices, or the effect 'spikes' not as many units: ask for the \
+                   layout \"map\", give the units by their places, or open a session for each of \
+                   these fingers";
+    let problem = Problem::new(ErrorCode::BadContact, message);
+    of_finger(hello, number, problem.at(format!("fingers[{number}].name")))
 }
 
 /// Holds a hello against the networks that were loaded; the one that it gets.

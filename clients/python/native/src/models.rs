@@ -85,11 +85,19 @@ impl Models {
         text.map_err(|problem| error(py, "NativeFault", (problem.to_string(),)))
     }
 
-    /// A session on the terms of a hello, as JSON.
-    fn session(&self, py: Python<'_>, hello: &str) -> PyResult<Session> {
+    /// A session on the terms of a hello, as JSON, with the models of the fingers that it may name.
+    fn session(
+        &self,
+        py: Python<'_>,
+        hello: &str,
+        fingers: Vec<(String, Bound<'_, Self>)>,
+    ) -> PyResult<Session> {
+        let model_of =
+            |(name, models): (String, Bound<'_, Self>)| (name, models.get().model.clone());
+        let named: Vec<_> = fingers.into_iter().map(model_of).collect();
         let opened = compute(py, || {
             let hello = read_hello(hello)?;
-            Inside::open(&self.model, &hello)
+            Inside::open_each(&self.model, &named, &hello)
         })?;
         opened.map(Session::new).map_err(|problem| refused(py, &problem))
     }

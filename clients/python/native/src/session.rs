@@ -181,7 +181,7 @@ impl State {
         let mut head = header.answer(FrameStatus::Ok, total_us, made.scale).windowed(made.window);
         head.sample_type = self.inside.answer_sample_type();
         head.infer_us = u32::try_from(made.infer.as_micros()).unwrap_or(u32::MAX);
-        (head.queue_us, head.tier, head.flags) = (0, 0, made.flags);
+        (head.queue_us, head.tier, head.flags) = (0, made.tier, made.flags);
         Ok(Ok(self.inside.message(&head)))
     }
 

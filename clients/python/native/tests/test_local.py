@@ -2,6 +2,13 @@
 
 import dataclasses
 import inspect
+import json
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -247,3 +254,96 @@ def test_a_series_in_process_names_the_frame_that_is_refused(pressure_pa):
     with papilla.local(tier="nano") as session:
         assert session.series(frames).flagged("out_of_range") == 1
         assert any("beyond" in words or "range" in words for words in session.warnings), session.warnings
+
+
+@pytest.fixture(scope="module")
+def fingers(tmp_path_factory):
+    """A folder with another finger than the default one, whose own default is another network."""
+    folder = tmp_path_factory.mktemp("fingers")
+    other, models = folder / "other", papilla.model.folder(None)
+    other.mkdir()
+    for file in (
+        "atlas.json",
+        "finger.contact",
+        "finger.toml",
+        "contact.json",
+        "errors.json",
+        "nano.json",
+        "nano.onnx",
+    ):
+        if (models / file).exists():
+            (other / file).symlink_to(models / file)
+    index = json.loads((models / "index.json").read_text())
+    index |= {"default": "nano", "models": ["nano"]}
+    for member in ("default_for_pressure", "on_demand"):
+        index.pop(member, None)
+    (other / "index.json").write_text(json.dumps(index))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def served(fingers):
+    """A service with that finger."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    program = Path(sys.executable).with_name("papilla-server")
+    command = [program, "--bind", f"127.0.0.1:{port}", "--fingers", fingers, "--log", "error"]
+    running = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        for _ in range(600):
+            try:
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=5).close()
+                break
+            except OSError:
+                assert running.poll() is None
+                time.sleep(0.1)
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        running.terminate()
+        running.wait(30)
+
+
+def test_fingers_by_name_are_the_same_to_the_bit(served, fingers):
+    hello = {"input": "objects", "objects": [BALL], "fingers": [{"name": "other", "width": 1.1}, {}, {"name": "other"}]}
+    hello["effects"] = ["summary", "afferents"]
+    told = ("name", "tier", "atlas_hash", "vertices", "pressure_max_pa", "sed_scale_j_per_m3", "method")
+    with papilla.Session(served, **hello) as there, papilla.local(bundles=fingers, **hello) as here:
+        for member in ("tier", "sections", "vertices", "fingers", "method", "warnings"):
+            assert here.ready.get(member) == there.ready.get(member), member
+        for one, other in zip(here.ready["finger_terms"], there.ready["finger_terms"], strict=True):
+            assert {name: one[name] for name in told} == {name: other[name] for name in told}
+        for number, pose in enumerate(POSES):
+            for finger in (0, 1, 2):
+                asked = {"finger": finger, "client_time_us": 1_000_000 + 10_000 * number}
+                pair = [session.send_poses(pose, **asked).result() for session in (here, there)]
+                same(*pair)
+                assert pair[0].tier == ("small" if finger == 1 else "nano")
+    # Those of sessions with one of the fingers each.
+    with (
+        papilla.local(bundles=fingers, **hello) as here,
+        papilla.local(models=fingers / "other", **hello_of_one()) as one,
+    ):
+        assert here.touch(POSES[3], finger=2).sed.tobytes() == one.touch(POSES[3]).sed.tobytes()
+        assert here.touch(POSES[3], finger=1).sed.tobytes() != one.touch(POSES[3]).sed.tobytes()
+
+
+def hello_of_one():
+    return {"input": "objects", "objects": [BALL], "effects": ["summary", "afferents"]}
+
+
+def test_fingers_that_are_not_there_are_named(fingers):
+    hello = hello_of_one() | {"fingers": [{"name": "other"}, {"name": "nobody"}]}
+    with pytest.raises(papilla.Refused, match="'nobody' was loaded, only default, other") as refused:
+        papilla.local(bundles=fingers, **hello)
+    assert refused.value.field == "fingers[1].name"
+    with pytest.raises(papilla.Refused, match="only default"):
+        papilla.local(**hello)
+    with pytest.raises(papilla.Refused, match="nobody"):
+        papilla.local(bundles=fingers, **hello_of_one(), fingers=[{"name": "../nobody"}])
+
+
+def test_new_terms_without_a_tier_are_those_of_a_new_session(pressure_pa):
+    with papilla.local(tier="nano") as session:
+        assert session.renew()["tier"] == "small-maps"
+        assert session.renew(tier="small-maps")["tier"] == "small-maps"

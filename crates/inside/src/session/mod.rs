@@ -1,42 +1,52 @@
 //! One hand: frames in, sections of answers out.
 
+mod ready;
+
 use std::{
     sync::{Arc, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 
 use bytes::BytesMut;
-use papilla_codec::{Input, Map, Output, Quantity, decode, encode, scale_of};
+use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
 use papilla_engine::EngineError;
 use papilla_proto::{
-    ErrorCode, ErrorEstimate, FrameHeader, HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX, MapSummary,
-    PROTOCOL_VERSION, PressureRange, Problem, Ready, RuntimeEffect, SampleType, Window,
+    ErrorCode, ErrorEstimate, FrameHeader, HEADER_LEN, Hello, MAP_LEN, MapSummary, PressureRange,
+    Problem, RuntimeEffect, SampleType, Window,
     effects::{OutOfRange, Section, SectionName},
     flags,
 };
 use papilla_render::{Known, KnownErrors, Maps, Read, Rendering, Source, source_of};
-use papilla_session_contact::{Finger, FrameForm, Hand};
+use papilla_session_contact::{Finger, FrameForm, Hand, of_finger};
 use papilla_session_effects as effects;
 use papilla_session_effects::Effects;
 
 use crate::{Model, Network, hello};
 
-/// A hand, and the memory of its frames: after [`open`](Self::open) only the network allocates.
-pub struct Session {
+/// What fingers of one folder share in a session.
+struct Part {
     model: Arc<Model>,
     /// The network that `network` is a session of.
     of: Arc<Network>,
     network: Box<dyn papilla_engine::Session>,
+    range: PressureRange,
+    /// Time that the network took when the session was opened.
+    infer: Duration,
+}
+
+/// A hand, and the memory of its frames: after [`open`](Self::open) only the network allocates.
+pub struct Session {
+    /// One for each folder that a finger is of, in the order of the fingers.
+    parts: Vec<Part>,
+    /// The part of each finger.
+    part_of: Vec<usize>,
     hand: Hand,
     /// Of each finger; none if the bare map is asked for.
     effects: Vec<Effects>,
-    range: PressureRange,
     hello: Hello,
     maps: Maps,
     /// Room for a header, and behind it the sections of the last answer.
     message: BytesMut,
-    /// Time that the network took when the session was opened.
-    infer: Duration,
 }
 
 /// What a frame says.
@@ -83,11 +93,14 @@ pub struct Made {
     pub infer: Duration,
     /// How wrong the answer is likely to be.
     pub errors: ErrorEstimate,
+    /// Number of the network, as `ready` gives it.
+    pub tier: u16,
 }
 
 impl std::fmt::Debug for Session {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Session").field("model", &self.model).finish_non_exhaustive()
+        let models = self.parts.iter().map(|part| &part.model);
+        f.debug_list().entries(models).finish()
     }
 }
 
@@ -95,47 +108,73 @@ fn of_engine(error: &EngineError) -> Problem {
     Problem::new(ErrorCode::Internal, format!("the inference failed: {error}"))
 }
 
-impl Session {
-    /// Takes all memory that the frames of this hello need.
-    ///
-    /// # Errors
-    /// A member is unusable or missing; the problem names it.
-    pub fn open(model: &Arc<Model>, hello: &Hello) -> Result<Self, Problem> {
-        hello::check_form(hello)?;
+impl Part {
+    fn new(hello: &Hello, model: &Arc<Model>) -> Result<Self, Problem> {
         let of = hello::choose(hello, model)?;
-        let Model { bundle, interface, shared, .. } = &**model;
-        let hand = Hand::of(hello, bundle.skin())?;
-        let (atlas, skin) = (&bundle.atlas, &bundle.raster);
-        let finger = effects::Finger { atlas, skin, interface, shared };
-        let mut effects = Vec::with_capacity(hand.fingers().len());
-        for _ in hand.fingers() {
-            effects.extend(Effects::of(hello, finger)?);
-        }
-        let mut network = of.model.session().map_err(|error| of_engine(&error))?;
-        let mut maps = Maps::default();
-        let mut infer = Duration::ZERO;
-        if effects.first().is_none_or(Effects::shows_sed) {
-            // The network's memory is touched before the first frame.
-            let start = Instant::now();
-            maps.infer(network.as_mut()).map_err(|error| of_engine(&error))?;
-            infer = start.elapsed();
-        }
+        let network = of.model.session().map_err(|error| of_engine(&error))?;
         let range = PressureRange {
             trained_max_pa: of.model.info().pressure_max_pa,
             beyond: hello.out_of_range.unwrap_or(OutOfRange::Clamp),
         };
-        let mut session = Self {
-            model: Arc::clone(model),
-            of,
-            network,
-            hand,
-            effects,
-            range,
-            hello: hello.clone(),
-            maps,
-            message: BytesMut::new(),
-            infer,
-        };
+        Ok(Self { model: Arc::clone(model), of, network, range, infer: Duration::ZERO })
+    }
+}
+
+impl Session {
+    /// Takes all memory that the frames of this hello need. All its fingers are of this model.
+    ///
+    /// # Errors
+    /// A member is unusable or missing; the problem names it.
+    pub fn open(model: &Arc<Model>, hello: &Hello) -> Result<Self, Problem> {
+        Self::open_each(model, &[], hello)
+    }
+
+    /// The same with fingers by name: a finger that the hello names is of the model beside its name, and all
+    /// others of the first one.
+    ///
+    /// # Errors
+    /// As [`Self::open`], also for a name that is not there, and for fingers whose answers would be laid out
+    /// otherwise than those of the first.
+    pub fn open_each(
+        model: &Arc<Model>,
+        named: &[(String, Arc<Model>)],
+        hello: &Hello,
+    ) -> Result<Self, Problem> {
+        hello::check_form(hello, named)?;
+        let models = hello::models(hello, model, named);
+        let (mut parts, mut part_of): (Vec<Part>, Vec<usize>) = (Vec::new(), Vec::new());
+        for (number, model) in models.iter().enumerate() {
+            let known = parts.iter().position(|part| Arc::ptr_eq(&part.model, model));
+            part_of.push(known.unwrap_or(parts.len()));
+            if known.is_none() {
+                let part = Part::new(hello, model);
+                parts.push(part.map_err(|problem| of_finger(hello, number, problem))?);
+            }
+        }
+        let skins: Vec<_> = models.iter().map(|model| model.bundle.skin()).collect();
+        let hand = Hand::of_each(hello, skins[0], &skins, &|| true)?;
+        let mut effects: Vec<Effects> = Vec::new();
+        for (number, model) in models.iter().enumerate().take(hand.fingers().len()) {
+            let Model { bundle, interface, shared, .. } = &***model;
+            let (atlas, skin) = (&bundle.atlas, &bundle.raster);
+            let of = Effects::of(hello, effects::Finger { atlas, skin, interface, shared });
+            effects.extend(of.map_err(|problem| of_finger(hello, number, problem))?);
+            if effects.last().map(Effects::sections) != effects.first().map(Effects::sections) {
+                return Err(hello::other_sections(hello, number));
+            }
+        }
+        let mut maps = Maps::default();
+        if effects.first().is_none_or(Effects::shows_sed) {
+            // The networks' memory is touched before the first frame.
+            for part in &mut parts {
+                let start = Instant::now();
+                maps.infer(part.network.as_mut()).map_err(|error| of_engine(&error))?;
+                part.infer = start.elapsed();
+            }
+        }
+        let message = BytesMut::new();
+        let mut session =
+            Self { parts, part_of, hand, effects, hello: hello.clone(), maps, message };
         let end = |s: &Section| (s.offset + s.bytes) as usize;
         let most = session.sections().iter().map(end).max().unwrap_or(0);
         session.message.reserve(most);
@@ -192,50 +231,6 @@ impl Session {
         self.effects.first().is_none_or(Effects::shows_sed)
     }
 
-    /// What the session agreed to, as a service says it. Latency is that of one run of the network.
-    #[must_use]
-    pub fn ready(&self) -> Ready {
-        let Self { model, of, hand, .. } = self;
-        let info = of.model.info();
-        let method = hand.method();
-        let errors = model.bundle.contact_errors.as_ref();
-        let effects = self.effects.first();
-        let unlearnt = model.unlearnt(of, self.hello.input.unwrap_or_default());
-        let unlearnt = unlearnt.filter(|_| self.shows_sed());
-        Ready {
-            version: PROTOCOL_VERSION.into(),
-            session: 0,
-            tier: info.name.clone(),
-            effects: info.effects.clone(),
-            atlas_hash: info.atlas_hash.clone(),
-            predicted_latency_us: u64::try_from(self.infer.as_micros()).unwrap_or(u64::MAX),
-            budget_us: None,
-            meets_budget: None,
-            width: MAP_SIDE_PX as u32,
-            height: MAP_SIDE_PX as u32,
-            sample_type: self.hello.sample_type,
-            pressure_max_pa: info.pressure_max_pa,
-            sed_scale_j_per_m3: scale_of(
-                Output::Samples(self.answer_sample_type()),
-                info.sed_max_j_per_m3,
-            ),
-            tier_number: 0,
-            tier_names: None,
-            answer_sample_type: self.answer_sample_type(),
-            session_effects: effects.map(|e| e.names().to_vec()).unwrap_or_default(),
-            sections: self.sections(),
-            units: effects.and_then(Effects::units).map(<[_]>::to_vec),
-            state: None,
-            vertices: model.bundle.atlas.vertex_count() as u32,
-            fingers: hand.fingers().len() as u32,
-            contact_us: None,
-            finger_terms: None,
-            method,
-            expected_error: errors.zip(method).and_then(|(errors, of)| errors.of(of)).cloned(),
-            warnings: hand.warnings().iter().cloned().chain(unlearnt).collect(),
-        }
-    }
-
     /// The effects that were asked for.
     #[must_use]
     pub fn effects(&self) -> &[RuntimeEffect] {
@@ -277,12 +272,14 @@ impl Session {
         self.message.clear();
         self.message.resize(HEADER_LEN, 0);
         let shows_sed = self.shows_sed();
-        let Self { model, of, hand, effects, maps, range, network, message: answer, .. } = self;
+        let Self { parts, part_of, hand, effects, maps, message: answer, .. } = self;
         let Some(of_finger) = hand.fingers().get(finger) else {
             let fingers = hand.fingers().len();
             let message = format!("finger {finger} was not announced; there are {fingers}");
             return Err(Problem::new(ErrorCode::BadContact, message).at("finger"));
         };
+        let tier = part_of[finger];
+        let Part { model, of, network, range, .. } = &mut parts[tier];
         let mut of_finger = lock(of_finger);
         let mut effects = effects.get_mut(finger);
         let is_tracked = !matches!(frame, Frame::NotTracked);
@@ -354,7 +351,8 @@ impl Session {
             answer.extend_from_slice(&errors.encode());
         }
         let (window, scale) = (Window::WHOLE, 1.0);
-        let mut made = Made { flags: found, shows_sed, window, scale, infer, errors };
+        let tier = tier as u16;
+        let mut made = Made { flags: found, shows_sed, window, scale, infer, errors, tier };
         if let Some(effects) = effects {
             let written = effects.write(&maps.pressure_pa, &maps.sed_j_per_m3, time_us, answer);
             let written = written.map_err(|error| {
@@ -376,7 +374,8 @@ impl Session {
         if sample_type.clips(values) {
             made.flags |= flags::OUT_OF_RANGE;
         }
-        let map = Map { quantity: Quantity::Sed, values, source: &self.of.card.name };
+        let source = &self.parts[usize::from(made.tier)].of.card.name;
+        let map = Map { quantity: Quantity::Sed, values, source };
         made.scale =
             encode(Output::Samples(sample_type), map, &mut self.message).map_err(|error| {
                 Problem::new(ErrorCode::Internal, format!("the map cannot be encoded: {error}"))
