@@ -4,7 +4,10 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
+use ndarray::Array2;
+use ndarray_npy::NpzWriter;
 use papilla_fingertip::scene::{Scene, schema};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -90,11 +93,14 @@ fn every_example_in_the_documentation_is_a_scene() {
         |name: &str| std::fs::read_to_string(root().join("docs/reference").join(name)).unwrap();
     let text = read("scenes.md") + &read("indenters.md");
     let rest: Table = toml::from_str(REST).unwrap();
-    // The examples name files, relative to the scene: those of `scenes`, and a body of their own.
+    // The examples name files, relative to the scene: those of `scenes`, a body and a pressure of their own.
     let folder = tempfile::tempdir().unwrap();
     let mesh = "two-layer.msh";
     std::fs::copy(root().join("scenes").join(mesh), folder.path().join(mesh)).unwrap();
     std::fs::write(folder.path().join("part.stl"), TETRAHEDRON).unwrap();
+    let mut measured = NpzWriter::new(File::create(folder.path().join("measured.npz")).unwrap());
+    measured.add_array("pressure_pa", &Array2::from_elem([224, 224], 5e3f32)).unwrap();
+    measured.finish().unwrap();
     let path = folder.path().join("example.toml");
     let mut seen = 0;
     for block in text.split("```toml\n").skip(1) {
