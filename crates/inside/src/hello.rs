@@ -8,7 +8,6 @@ use papilla_proto::{
     error::shortened,
     unknown_effect,
 };
-use papilla_session_contact::of_finger;
 
 use crate::{Model, Network};
 
@@ -69,16 +68,6 @@ pub(crate) fn models<'a>(
     let of_name = |name: &str| named.iter().find(|(known, _)| known == name).map(|(_, of)| of);
     let models: Vec<_> = announced.map(|one| of_name(one.name()).unwrap_or(default)).collect();
     if models.is_empty() { vec![default] } else { models }
-}
-
-/// The problem of a finger whose answers would be laid out otherwise than those of the first.
-pub(crate) fn other_sections(hello: &Hello, number: usize) -> Problem {
-    let message = "answers would be laid out otherwise than those of fingers[0], since its atlas has \
-                   not as many vertices, or the effect 'spikes' not as many units: ask for the \
-                   layout \"map\", give the units by their places, or open a session for each of \
-                   these fingers";
-    let problem = Problem::new(ErrorCode::BadContact, message);
-    of_finger(hello, number, problem.at(format!("fingers[{number}].name")))
 }
 
 /// Holds a hello against the networks that were loaded; the one that it gets.

@@ -167,6 +167,23 @@ fn unusable(field: &str, message: impl Into<String>) -> Problem {
     Problem::new(ErrorCode::BadEffect, message).at(field)
 }
 
+/// Refuses the last finger if its answers would be laid out otherwise than those of the first; `effects`
+/// are those of the fingers up to it.
+///
+/// # Errors
+/// The sections differ.
+pub fn check_alike(effects: &[Effects]) -> Result<(), Problem> {
+    if effects.last().map(Effects::sections) == effects.first().map(Effects::sections) {
+        return Ok(());
+    }
+    let message = "answers would be laid out otherwise than those of fingers[0], since its atlas has \
+                   not as many vertices, or the effect 'spikes' not as many units: ask for the \
+                   layout \"map\", give the units by their places, or open a session for each of \
+                   these fingers";
+    let last = effects.len() - 1;
+    Err(Problem::new(ErrorCode::BadContact, message).at(format!("fingers[{last}].name")))
+}
+
 impl Effects {
     /// The effects that a hello asks for; none if it asks for the bare map.
     ///

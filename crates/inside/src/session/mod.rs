@@ -19,7 +19,7 @@ use papilla_proto::{
 use papilla_render::{Known, KnownErrors, Maps, Read, Rendering, Source, source_of};
 use papilla_session_contact::{Finger, FrameForm, Hand, of_finger};
 use papilla_session_effects as effects;
-use papilla_session_effects::Effects;
+use papilla_session_effects::{Effects, check_alike};
 
 use crate::{Model, Network, hello};
 
@@ -154,14 +154,12 @@ impl Session {
         let skins: Vec<_> = models.iter().map(|model| model.bundle.skin()).collect();
         let hand = Hand::of_each(hello, skins[0], &skins, &|| true)?;
         let mut effects: Vec<Effects> = Vec::new();
-        for (number, model) in models.iter().enumerate().take(hand.fingers().len()) {
+        for (number, model) in models.iter().enumerate() {
             let Model { bundle, interface, shared, .. } = &***model;
             let (atlas, skin) = (&bundle.atlas, &bundle.raster);
             let of = Effects::of(hello, effects::Finger { atlas, skin, interface, shared });
             effects.extend(of.map_err(|problem| of_finger(hello, number, problem))?);
-            if effects.last().map(Effects::sections) != effects.first().map(Effects::sections) {
-                return Err(hello::other_sections(hello, number));
-            }
+            check_alike(&effects).map_err(|problem| of_finger(hello, number, problem))?;
         }
         let mut maps = Maps::default();
         if effects.first().is_none_or(Effects::shows_sed) {

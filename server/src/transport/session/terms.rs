@@ -17,7 +17,7 @@ use papilla_proto::{
     unknown_effect,
 };
 use papilla_session_contact::{ContactAssets, Hand, Skin, of_finger};
-use papilla_session_effects::Effects;
+use papilla_session_effects::{Effects, check_alike};
 use papilla_session_state::{SealedFor, tier_of};
 use tokio::sync::OwnedSemaphorePermit;
 
@@ -307,9 +307,7 @@ fn agree(
         still_asked(cancel)?;
         let its_own = Effects::of(hello, of.catalogue.finger());
         effects.extend(its_own.map_err(|problem| of_finger(hello, number, problem))?);
-        if effects.last().map(Effects::sections) != effects.first().map(Effects::sections) {
-            return Err(of_finger(hello, number, other_sections(number)));
-        }
+        check_alike(&effects).map_err(|problem| of_finger(hello, number, problem))?;
     }
     let info = effects.first().map_or_else(ReadyInfo::default, |first| ReadyInfo {
         names: first.names().to_vec(),
@@ -375,15 +373,6 @@ fn choose(
         return Err(Problem::new(ErrorCode::AtlasMismatch, message).at("atlas_hash"));
     }
     Ok(place)
-}
-
-/// The problem of a finger whose answers would be laid out differently from those of the first.
-fn other_sections(number: usize) -> Problem {
-    let message = "answers would be laid out otherwise than those of fingers[0], since its atlas has \
-                   not as many vertices, or the effect 'spikes' not as many units: ask for the \
-                   layout \"map\", give the units by their places, or open a session for each of \
-                   these fingers";
-    Problem::new(ErrorCode::BadContact, message).at(format!("fingers[{number}].name"))
 }
 
 /// Makes the `ready` message. Called once for these terms, since it takes `agreed`.
