@@ -161,26 +161,9 @@ impl PointContact {
                 curvature: None,
             });
         }
-        Some(Self::pressing(d, area, multiplier_mpa, penalty, t))
-    }
-
-    /// A point that is held to the indenter, pulled where it is apart.
-    #[must_use]
-    pub fn held(d: &Distance, area: f64, penalty: f64) -> Self {
-        let mut held = Self::pressing(d, area, 0.0, penalty, -penalty * d.gap_mm);
-        if d.gap_mm > 0.0 {
-            held.curvature = None;
-            held.stiffness = std::array::from_fn(|i| {
-                std::array::from_fn(|j| area * penalty * d.normal[i] * d.normal[j])
-            });
-        }
-        held
-    }
-
-    fn pressing(d: &Distance, area: f64, multiplier_mpa: f64, penalty: f64, t: f64) -> Self {
         let n = d.normal;
         let convex = (0..3).map(|i| d.hessian[i][i]).sum::<f64>() > 0.0;
-        Self {
+        Some(Self {
             energy_mj: 0.5 * area * (t * t - multiplier_mpa * multiplier_mpa) / penalty,
             traction_mpa: t,
             force_n: n.map(|v| -area * t * v),
@@ -188,6 +171,6 @@ impl PointContact {
                 std::array::from_fn(|j| area * (penalty * n[i] * n[j] - t * d.hessian[i][j]))
             }),
             curvature: convex.then(|| d.hessian.map(|row| row.map(|h| area * t * h))),
-        }
+        })
     }
 }

@@ -32,9 +32,7 @@ impl Solver<'_> {
             true => options.residual_tolerance,
             false => 1e-3f64.max(options.residual_tolerance),
         };
-        let mut expected = self.expected.take();
         for update in 0..=updates {
-            let first = expected.take();
             let (multipliers, u, independent, fluid) =
                 (&trial.multipliers, &mut trial.u, &mut trial.independent, &mut trial.fluid);
             let fixed = Fixed {
@@ -44,10 +42,8 @@ impl Solver<'_> {
                 variables: HistoryVariables { history: &trial.history, dt_s },
                 friction: rubs.then_some(&trial.friction),
                 fluid: None,
-                expected_mpa: first.as_deref(),
             };
             self.newton.equilibrate(tolerance, fixed, u, independent, fluid.as_mut())?;
-            let fixed = Fixed { expected_mpa: None, ..fixed };
             let e = &self.newton.current;
             let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
             let closes = |gap_mm: f64| by_penalty || gap_mm <= options.gap_tolerance_mm;

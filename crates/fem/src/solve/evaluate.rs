@@ -66,9 +66,6 @@ pub struct Trial<'a> {
     pub friction: Option<&'a FrictionTrial>,
     /// The fluid's pressure; `None` without fluid.
     pub fluid: Option<Flow<'a>>,
-    /// Tractions that are expected: points with one are held to the indenter, pulled or pushed, and
-    /// no others; `None`: contact as it is.
-    pub expected_mpa: Option<&'a [f64]>,
 }
 
 /// Evaluates the body; fills `tangent` if given.
@@ -230,12 +227,7 @@ fn contact(
         let multiplier = if has_multipliers { last } else { 0.0 };
         let x = support.of(|n| trial.place(problem, n));
         let d = placement.distance(indenter.shape.as_ref(), x);
-        let found = match trial.expected_mpa {
-            None => PointContact::new(&d, area, multiplier, trial.penalty),
-            Some(expected) if expected[at] > 0.0 => Some(PointContact::held(&d, area, trial.penalty)),
-            Some(_) => None,
-        };
-        let Some(c) = found else {
+        let Some(c) = PointContact::new(&d, area, multiplier, trial.penalty) else {
             out.traction_mpa.push(0.0);
             continue;
         };

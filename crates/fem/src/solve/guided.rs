@@ -22,8 +22,6 @@ pub struct Guess {
     /// what is interpolated between nodes changes the volume of nearly incompressible elements,
     /// and the pressure of that would make the tangent indefinite.
     pub dilatation: Vec<Dilatation>,
-    /// Pressure that is expected, MPa, one a node; empty if nothing is known of it.
-    pub pressure_mpa: Vec<f64>,
 }
 
 impl Solver<'_> {
@@ -64,36 +62,11 @@ impl Solver<'_> {
             mixed::dilatations(self.newton.problem, &trial.u, &mut trial.independent);
         }
         self.newton.indefinite_end = self.newton.effort.indefinite_factorizations + INDEFINITE_MAX;
-        self.expected = known(target).or_else(|| self.expected_at_points(&guess.pressure_mpa));
-        if let (Some(expected), Some(real)) = (&self.expected, read(target, "PAPILLA_COMPARE")) {
-            let count = |f: &dyn Fn(bool, bool) -> bool| expected.iter().zip(&real).filter(|(e, r)| f(**e > 0.0, **r > 0.0)).count();
-            tracing::info!(both = count(&|e, r| e && r), too_many = count(&|e, r| e && !r), missing = count(&|e, r| !e && r), "expected contact");
-        }
-        let before = self.newton.effort;
         let found = self.augmented(target, &mut trial);
-        let spent = self.newton.effort.since(&before);
-        tracing::info!(target, ok = found.is_ok(), newton = spent.newton_iterations, factorizations = spent.factorizations,
-            indefinite = spent.indefinite_factorizations, cg = spent.cg_iterations, assemble_s = spent.assemble_s,
-            factor_s = spent.factor_s, solve_s = spent.solve_s, "beside a guess");
-        if found.is_ok() { store(target, &self.newton.current.traction_mpa); }
         self.newton.indefinite_end = u32::MAX;
         found?;
         self.accept(target, trial);
         Ok(())
-    }
-
-    fn expected_at_points(&self, nodal_mpa: &[f64]) -> Option<Vec<f64>> {
-        let tau: f64 = std::env::var("PAPILLA_TAU").ok()?.parse().ok()?;
-        let surface = self.newton.problem.contact.as_ref()?;
-        if nodal_mpa.is_empty() || self.contact_rule().has_multipliers() {
-            return None;
-        }
-        let least = tau * nodal_mpa.iter().copied().fold(0.0, f64::max);
-        let at = |(support, _): (crate::contact::Support<'_>, f64)| {
-            let [p, ..] = support.of(|n| [nodal_mpa[n], 0.0, 0.0]);
-            if p > least { p } else { 0.0 }
-        };
-        Some(surface.points(self.contact_rule()).iter().map(at).collect())
     }
 
     /// The dilatation of each element where it is an unknown of its own; else empty.
@@ -107,24 +80,5 @@ impl Solver<'_> {
     /// equilibria in between, times what this body's are over the guide's at the ends.
     pub fn take_course(&mut self, guide: &Solver<'_>) {
         self.work.take_course(&guide.work);
-    }
-}
-
-/// A trial: tractions that another run of the same scene ended with.
-fn known(target: f64) -> Option<Vec<f64>> {
-    read(target, "PAPILLA_EXPECTED")
-}
-
-fn read(target: f64, variable: &str) -> Option<Vec<f64>> {
-    let folder = std::env::var_os(variable)?;
-    let bytes = std::fs::read(std::path::Path::new(&folder).join(format!("{target:.12}"))).ok()?;
-    Some(bytes.chunks_exact(8).map(|c| f64::from_le_bytes(c.try_into().unwrap_or_default())).collect())
-}
-
-fn store(target: f64, traction_mpa: &[f64]) {
-    let Some(folder) = std::env::var_os("PAPILLA_STORE_EXPECTED") else { return };
-    let bytes: Vec<u8> = traction_mpa.iter().flat_map(|t| t.to_le_bytes()).collect();
-    if let Err(error) = std::fs::write(std::path::Path::new(&folder).join(format!("{target:.12}")), bytes) {
-        tracing::warn!(%error, "not stored");
     }
 }

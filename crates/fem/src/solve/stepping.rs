@@ -24,8 +24,6 @@ pub struct Solver<'a> {
     pub(super) work: Work,
     /// Load fraction that a time step may take; `None` for elastic bodies.
     pub(super) time_step: Option<f64>,
-    /// Tractions that the next equilibrium is expected to have.
-    pub expected: Option<Vec<f64>>,
 }
 
 impl<'a> Solver<'a> {
@@ -43,7 +41,6 @@ impl<'a> Solver<'a> {
             before: None,
             work: Work::default(),
             time_step: None,
-            expected: None,
         };
         solver.start(Loading::default());
         Ok(solver)
@@ -230,7 +227,6 @@ impl<'a> Solver<'a> {
             variables: HistoryVariables { history, dt_s: 0.0 },
             friction: (!friction.points.is_empty()).then_some(friction),
             fluid: fluid.as_ref().map(|f| f.flow()),
-            expected_mpa: None,
         };
         // It was in equilibrium: nothing in it is inverted.
         if let Err(error) = self.newton.evaluate(fixed, u, independent) {

@@ -117,7 +117,6 @@ pub(super) fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, Infl
         variables: Default::default(),
         friction: None,
         fluid: None,
-        expected_mpa: None,
     };
     let mut out = Evaluation::default();
     evaluate_body(problem, &Loading::default(), &trial, Some(&mut tangent), &mut out)?;

@@ -201,7 +201,6 @@ impl<'a> Curvature<'a> {
                 variables: Default::default(),
                 friction: None,
                 fluid: None,
-                expected_mpa: None,
             };
             evaluate_body(problem, &Loading::default(), &trial, None, &mut self.out)?;
             let forces = sum.iter_mut().zip(&self.out.residual_n);

@@ -58,58 +58,13 @@ impl<'a> Guided<'a> {
         for (t, (now, before)) in dilatation.iter_mut().zip(moved) {
             *t = [0, 1, 2, 3].map(|i| t[i] + part * (now[i] - before[i]));
         }
-        let pressure_mpa = if part < 1.0 { Vec::new() } else { now.pressure_mpa.clone() };
-        Guess { displacement_mm, dilatation, pressure_mpa }
+        Guess { displacement_mm, dilatation }
     }
 }
 
 fn on_own_mesh(guide: &Solver<'_>, transfer: &Transfer) -> Guess {
-    let pressure = edge_field(guide);
     Guess {
         displacement_mm: transfer.nodal(guide.displacement_mm()),
         dilatation: transfer.linear(guide.independent_dilatation()),
-        pressure_mpa: transfer.nodal(&pressure).iter().map(|p| if std::env::var_os("PAPILLA_BY_P").is_some() { p[1] } else { p[0] }).collect(),
     }
-}
-
-/// What is positive where the guide touches and negative where it does not, about linear across the
-/// edge of contact: pressure grows as the root of the distance to the edge, the gap as its power 3/2.
-fn edge_field(guide: &Solver<'_>) -> Vec<[f64; 3]> {
-    let mut field = vec![[0.0; 3]; guide.displacement_mm().len()];
-    let problem = guide.problem();
-    let Some(contact) = &problem.contact else { return field };
-    let x = guide.deformed();
-    let mut known = vec![false; field.len()];
-    for (&n, p) in contact.nodes().iter().zip(guide.traction_mpa()) {
-        let n = n as usize;
-        known[n] = true;
-        field[n][1] = p;
-        field[n][0] = if p > 0.0 {
-            p * p
-        } else {
-            -guide.distance(x[n]).map_or(0.0, |d| d.gap_mm.max(0.0).powf(2.0 / 3.0))
-        };
-    }
-    let Some(surface) = problem.mesh.surfaces.get("skin") else { return field };
-    let per = surface.kind.nodes();
-    let (mut inside, mut outside) = ((0.0, 0.0), (0.0, 0.0));
-    for face in surface.connectivity.chunks_exact(per) {
-        let values = || face.iter().map(|&n| field[n as usize][0]);
-        if values().any(|v| v > 0.0) && values().any(|v| v < 0.0) {
-            for v in values() {
-                let of = if v > 0.0 { &mut inside } else { &mut outside };
-                *of = (of.0 + v.abs(), of.1 + 1.0);
-            }
-        }
-    }
-    let scale = (inside.0 / inside.1) / (outside.0 / outside.1);
-    tracing::info!(scale, edge = inside.1 + outside.1, "edge of the guide's contact");
-    for v in &mut field {
-        if v[0] < 0.0 {
-            v[0] *= scale;
-        }
-    }
-    let most = field.iter().map(|v| v[0]).fold(0.0, f64::max);
-    field.iter_mut().for_each(|v| v[0] /= most);
-    field
 }

@@ -92,7 +92,6 @@ pub fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, Ste
         variables: HistoryVariables::default(),
         friction: None,
         fluid: None,
-        expected_mpa: None,
     };
     let mut out = Evaluation::default();
     evaluate_body(problem, &Loading::default(), &trial, None, &mut out)?;

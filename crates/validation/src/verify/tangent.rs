@@ -92,7 +92,6 @@ fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usi
             variables: HistoryVariables::default(),
             friction: None,
             fluid: None,
-            expected_mpa: None,
         };
         let mut out = Evaluation::default();
         evaluate_body(&problem, &loading, &trial, with_tangent.then_some(&mut tangent), &mut out)?;

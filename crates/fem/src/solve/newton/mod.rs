@@ -30,7 +30,6 @@ pub(super) struct Fixed<'a> {
     pub variables: HistoryVariables<'a>,
     pub friction: Option<&'a FrictionTrial>,
     pub fluid: Option<Flow<'a>>,
-    pub expected_mpa: Option<&'a [f64]>,
 }
 
 impl<'a> Fixed<'a> {
@@ -44,7 +43,6 @@ impl<'a> Fixed<'a> {
             variables: self.variables,
             friction: self.friction,
             fluid: self.fluid,
-            expected_mpa: self.expected_mpa,
         }
     }
 }
@@ -149,7 +147,7 @@ impl<'a> Newton<'a> {
     pub(super) fn equilibrate(
         &mut self,
         tolerance: f64,
-        mut fixed: Fixed<'_>,
+        fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
         independent: &mut [Dilatation],
         fluid: Option<&mut FluidState>,
@@ -164,7 +162,7 @@ impl<'a> Newton<'a> {
             let (norm, reference) = (self.current.residual_norm, self.current.reference_norm);
             let load_fraction = fixed.load_fraction;
             tracing::trace!(iteration, load_fraction, residual = norm, reference, "newton");
-            if fixed.expected_mpa.is_none() && (norm <= tolerance * reference || norm <= floor) {
+            if norm <= tolerance * reference || norm <= floor {
                 return Ok(());
             }
             let last = iteration == self.options.newton_max;
@@ -191,21 +189,10 @@ impl<'a> Newton<'a> {
             }
             match self.line_search(fixed, u, independent) {
                 // Energy differences drown in rounding, and so does what is left of the residual.
-                Err(cause) if fixed.expected_mpa.is_some() => {
-                    tracing::info!(%cause, "the expected contact leads nowhere");
-                    fixed.expected_mpa = None;
-                    self.evaluate(fixed, u, independent)?;
-                    previous = f64::INFINITY;
-                    continue;
-                }
                 Err(StepError::LineSearch { .. }) if norm <= self.rounding_n(u) => return Ok(()),
                 other => other?,
             }
             self.effort.newton_iterations += 1;
-            if fixed.expected_mpa.take().is_some() {
-                self.evaluate(fixed, u, independent)?;
-                previous = f64::INFINITY;
-            }
         }
         Err(StepError::Newton {
             iterations: self.options.newton_max,
