@@ -92,7 +92,7 @@ pub const SETS: [Set; 11] = [
     },
     Set {
         folder: "pressed-graded",
-        about: "plates to 7 N, keys, gratings",
+        about: "plates to 7 N, keys (plates of 7 x 7 mm), gratings",
         group: "hard and deep",
         ..Set::PLAIN
     },
