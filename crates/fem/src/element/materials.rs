@@ -17,11 +17,13 @@ impl Region {
     }
 }
 
-/// Constitutive model of each region.
+/// Constitutive model of each region, and the tension of a surface.
 #[derive(Clone)]
 pub struct Materials {
     models: Vec<Arc<dyn ConstitutiveModel>>,
     stiff: Vec<bool>,
+    /// Surface under tension at rest, N/mm.
+    tension: Option<(String, f64)>,
 }
 
 impl Materials {
@@ -29,7 +31,7 @@ impl Materials {
     #[must_use]
     pub fn new(models: Vec<Arc<dyn ConstitutiveModel>>) -> Self {
         let stiff = vec![false; models.len()];
-        Self { models, stiff }
+        Self { models, stiff, tension: None }
     }
 
     /// Marks regions as so much stiffer than the others that they are as good as held: the
@@ -43,6 +45,18 @@ impl Materials {
             self.stiff[r.index()] = true;
         }
         self
+    }
+
+    /// With a named surface of the body under tension at rest, N/mm, in every direction along it.
+    #[must_use]
+    pub fn with_tension(self, surface: &str, n_per_mm: f64) -> Self {
+        Self { tension: Some((surface.to_owned(), n_per_mm)), ..self }
+    }
+
+    /// The surface under tension at rest and its tension, N/mm.
+    #[must_use]
+    pub fn tension(&self) -> Option<(&str, f64)> {
+        self.tension.as_ref().map(|(surface, n_per_mm)| (surface.as_str(), *n_per_mm))
     }
 
     /// The models by region.

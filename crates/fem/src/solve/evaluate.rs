@@ -12,7 +12,8 @@ use crate::linear::SymmetricMatrix;
 /// What an evaluation at one displacement found.
 #[derive(Clone, Debug, Default)]
 pub struct Evaluation {
-    /// Elastic energy, mJ; of a viscoelastic body the potential of the step.
+    /// Elastic energy, mJ, with that of a surface under tension; of a viscoelastic body the potential
+    /// of the step.
     pub stored_mj: f64,
     /// Energy in the penalty that stands for contact where there are no multipliers, mJ.
     pub contact_mj: f64,
@@ -87,6 +88,10 @@ pub fn evaluate_body(
     elements(problem, trial, tangent.as_deref_mut(), out, &mut lag)?;
     lag.condense(problem);
     fluid(problem, trial, tangent.as_deref_mut(), out)?;
+    if let Some(tension) = &problem.tension {
+        let forces = (tangent.as_deref_mut(), out.residual_n.as_mut_slice());
+        out.stored_mj += tension.add(&problem.mesh, &problem.system, trial.u, forces);
+    }
     out.potential_mj = out.stored_mj;
     let mut reference = contact(problem, loading, trial, tangent.as_deref_mut(), out);
     let share = loading.share(trial.load_fraction);

@@ -51,7 +51,8 @@ pub struct EnergySplit {
 
 /// Stored and dissipated energy at `u`, with the history that belongs to it.
 pub(super) fn energies(problem: &Problem, history: &[f64], u: &[[f64; 3]]) -> EnergySplit {
-    let mut split = EnergySplit::default();
+    let tension_mj = problem.tension.as_ref().map_or(0.0, |t| t.energy_mj(u));
+    let mut split = EnergySplit { stored_mj: tension_mj, dissipated_mj: 0.0 };
     for (b, (block, geometry)) in problem.mesh.blocks.iter().zip(&problem.geometry).enumerate() {
         let n = block.kind.nodes();
         let mut force = vec![[0.0; 3]; n];

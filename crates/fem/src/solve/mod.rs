@@ -16,9 +16,11 @@ mod pressure;
 mod problem;
 mod results;
 mod rigid_modes;
+mod sides;
 mod snapshot;
 mod state;
 mod stepping;
+mod tension;
 mod time_step;
 mod work;
 
@@ -35,6 +37,7 @@ pub use rigid_modes::{FreeMode, FreePart};
 pub use snapshot::{Snapshot, SnapshotError};
 pub use state::{Mark, StepReport};
 pub use stepping::Solver;
+pub use tension::{SurfaceTension, SurfaceTensionError};
 
 use crate::linear::FactorError;
 

@@ -6,10 +6,10 @@
 //! more iterations (Schweizerhof & Ramm 1984).
 
 use super::problem::Problem;
+use super::sides::{Side, Sides};
 use crate::linear::SymmetricMatrix;
 use crate::mesh::Mesh;
 use papilla_vector::cross;
-use std::collections::HashMap;
 
 /// Two Gauss points and weights on `[0, 1]`.
 const GAUSS_2: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
@@ -34,10 +34,7 @@ pub(super) struct Acting {
 #[derive(Clone, Debug)]
 struct LoadedFace {
     nodes: Vec<u32>,
-    block: usize,
-    element: usize,
-    /// Place of each node among those of the element.
-    local: Vec<usize>,
+    side: Side,
     points: Vec<Point>,
 }
 
@@ -101,13 +98,10 @@ impl SurfacePressure {
                 loaded.push((nodes, points));
             }
         }
-        let owners = owners(mesh, loaded.iter().map(|(nodes, _)| *nodes));
+        let sides = Sides::new(mesh, loaded.iter().map(|(nodes, _)| *nodes));
         let faces = loaded.into_iter().map(|(nodes, points)| {
-            let &(block, element) =
-                owners.get(&key(nodes)).ok_or_else(|| SurfacePressureError::Loose(name()))?;
-            let own = mesh.blocks[block].element(element);
-            let local = nodes.iter().filter_map(|n| own.iter().position(|o| o == n)).collect();
-            Ok(LoadedFace { nodes: nodes.to_vec(), block, element, local, points })
+            let side = sides.of(nodes).ok_or_else(|| SurfacePressureError::Loose(name()))?;
+            Ok(LoadedFace { nodes: nodes.to_vec(), side, points })
         });
         Ok(Self { faces: faces.collect::<Result<_, _>>()? })
     }
@@ -242,13 +236,14 @@ impl LoadedFace {
         share: f64,
         tangent: &mut SymmetricMatrix,
     ) {
-        let size = 3 * problem.mesh.blocks[self.block].kind.nodes();
+        let Side { block, element, local } = &self.side;
+        let size = 3 * problem.mesh.blocks[*block].kind.nodes();
         let mut dense = vec![0.0; size * size];
         for point in &self.points {
             let [t1, t2] = point.tangents(self, &problem.mesh, u, 1.0);
             let half = 0.5 * share * point.weighted_mpa;
-            for (a, &at) in self.local.iter().enumerate() {
-                for (b, &to) in self.local.iter().enumerate() {
+            for (a, &at) in local.iter().enumerate() {
+                for (b, &to) in local.iter().enumerate() {
                     let (va, vb) = (point.value[a], point.value[b]);
                     let ([a1, a2], [b1, b2]) = (point.gradient[a], point.gradient[b]);
                     let v: [f64; 3] = std::array::from_fn(|k| {
@@ -262,39 +257,8 @@ impl LoadedFace {
                 }
             }
         }
-        problem.system.add_element(tangent, self.block, self.element, &mut dense);
+        problem.system.add_element(tangent, *block, *element, &mut dense);
     }
-}
-
-/// The nodes of a face whatever their order.
-fn key(nodes: &[u32]) -> Vec<u32> {
-    let mut key = nodes.to_vec();
-    key.sort_unstable();
-    key
-}
-
-/// Block and element of each of some faces.
-fn owners<'a>(
-    mesh: &Mesh,
-    faces: impl Iterator<Item = &'a [u32]>,
-) -> HashMap<Vec<u32>, (usize, usize)> {
-    let wanted: HashMap<Vec<u32>, ()> = faces.map(|nodes| (key(nodes), ())).collect();
-    let mut found = HashMap::new();
-    for (b, block) in mesh.blocks.iter().enumerate() {
-        let sides: Vec<Vec<usize>> = (0..block.kind.sides().len())
-            .map(|side| crate::mesh::surface::side_nodes(block.kind, side))
-            .collect();
-        for e in 0..block.len() {
-            let own = block.element(e);
-            for side in &sides {
-                let nodes = key(&side.iter().map(|&l| own[l]).collect::<Vec<_>>());
-                if wanted.contains_key(&nodes) {
-                    found.insert(nodes, (b, e));
-                }
-            }
-        }
-    }
-    found
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
 use super::history_layout::HistoryLayout;
+use super::tension::{SurfaceTension, SurfaceTensionError};
 use crate::biphasic::{FluidError, FluidPhase, FluidSpec, Solid};
 use crate::contact::{ContactRule, ContactSurface, Support};
 use crate::element::geometry::displacement_gradient;
@@ -25,6 +26,8 @@ pub struct Problem {
     pub system: SymbolicSystem,
     /// Where contact may happen.
     pub contact: Option<ContactSurface>,
+    /// Tension of a surface at rest; `None` of a body whose surfaces are slack.
+    pub tension: Option<SurfaceTension>,
     /// What flows in it; `None` of a body without fluid.
     pub fluid: Option<FluidPhase>,
     /// Force that a volume of fluid too much amounts to, N/mm3; 0 without fluid.
@@ -55,6 +58,9 @@ pub enum ProblemError {
         /// Surface.
         name: String,
     },
+    /// A surface cannot be under tension.
+    #[error(transparent)]
+    Tension(#[from] SurfaceTensionError),
     /// The body cannot be full of fluid.
     #[error(transparent)]
     Fluid(#[from] FluidError),
@@ -108,6 +114,10 @@ impl Problem {
             }
         };
         let history_layout = HistoryLayout::new(&mesh, &geometry, &materials);
+        let tension = materials
+            .tension()
+            .map(|(surface, n_per_mm)| SurfaceTension::new(&mesh, surface, n_per_mm))
+            .transpose()?;
         Ok(Self {
             mesh,
             geometry,
@@ -116,6 +126,7 @@ impl Problem {
             fixed,
             system,
             contact,
+            tension,
             fluid: None,
             surplus_n_per_mm3: 0.0,
         })
