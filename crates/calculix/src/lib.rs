@@ -56,6 +56,11 @@ pub enum ExportError {
         /// What CalculiX does with it.
         why: &'static str,
     },
+    /// Skin that is stretched at rest.
+    #[error(
+        "a deck has no tension of the skin: leave out materials.skin_tension_n_per_mm to export"
+    )]
+    Tension,
     /// A motion that needs an unknown of its own.
     #[error(
         "CalculiX cannot express motion.force_n: a deck prescribes where the indenter is. Give \
@@ -158,11 +163,14 @@ const INEXPRESSIBLE: [(&str, &str); 3] = [
         "its penalty friction sticks by a spring that slips in any load step, so the force depends \
          on increments and on a stiffness that is not a property of skin",
     ),
-    ("poroelastic", "it has no elements with pore pressure"),
+    ("biphasic", "it has no elements with pore pressure"),
 ];
 
-/// Refuses a scene's effect that CalculiX cannot express.
+/// Refuses a scene's effect that a deck cannot express.
 fn refuse_inexpressible(scene: &Scene) -> Result<(), ExportError> {
+    if scene.materials.skin_tension_n_per_mm.is_some() {
+        return Err(ExportError::Tension);
+    }
     match INEXPRESSIBLE.iter().find(|(effect, _)| scene.has(effect)) {
         Some(&(effect, why)) => Err(ExportError::Effect { effect, why }),
         None => Ok(()),
@@ -177,6 +185,22 @@ fn number(v: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Under a name that no effect has, nothing would be refused.
+    #[test]
+    fn what_a_deck_cannot_hold_is_an_effect() {
+        for (effect, _) in INEXPRESSIBLE {
+            assert!(papilla_fingertip::scene::EffectName::named(effect).is_some(), "{effect}");
+        }
+    }
+
+    #[test]
+    fn tense_skin_is_refused() {
+        let mut scene = Scene::usual();
+        assert_eq!(refuse_inexpressible(&scene), Ok(()));
+        scene.materials.skin_tension_n_per_mm = Some(0.01);
+        assert_eq!(refuse_inexpressible(&scene), Err(ExportError::Tension));
+    }
 
     #[test]
     fn numbers_fit_their_field() {

@@ -63,7 +63,7 @@ impl SceneDeck {
         for tissue in Tissue::ALL {
             let spec = scene.materials.of(setup.plan.tissues[tissue.index()]);
             let card = MaterialCard::of(spec, &setup.plan)
-                .map_err(|source| TissueError { tissue: tissue.name(), source })?;
+                .map_err(|source| TissueError::Material { tissue: tissue.name(), source })?;
             cards[tissue.index()] = Some(card);
         }
         let moving = setup.body.indenter(&setup.approach, &setup.drive)?;

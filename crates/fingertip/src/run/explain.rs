@@ -121,7 +121,7 @@ impl Explanation {
             motion: motion(scene, &setup.drive),
             doubts,
             outputs: Output::ALL.into_iter().filter(|&o| scene.writes(o)).collect(),
-            simulated: simulated.collect(),
+            simulated: simulated.chain(tension(&setup)).collect(),
             left_out: left_out.collect(),
             plan: setup.plan,
             setup_s,
@@ -193,6 +193,17 @@ impl Explanation {
         }
         text
     }
+}
+
+/// The skin's tension, if it has one: materials give it, no effect.
+fn tension(setup: &Simulation) -> Option<On> {
+    let tension = setup.body.problem.tension.as_ref()?;
+    Some(On {
+        effect: "skin tension",
+        adds: "skin that is stretched at rest, by materials.skin_tension_n_per_mm",
+        state: tension.len(),
+        state_is: "faces",
+    })
 }
 
 /// Why an effect is left out, and what naming it would take.

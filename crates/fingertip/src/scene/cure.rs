@@ -47,7 +47,11 @@ fn cure(message: &str, page: &str) -> String {
 
 /// The field that a material's error is about.
 pub(crate) fn material_field(error: &TissueError) -> String {
-    let field = match error.source {
+    let (tissue, source) = match error {
+        TissueError::Material { tissue, source } => (tissue, source),
+        TissueError::Tension(_) => return "materials.skin_tension_n_per_mm".into(),
+    };
+    let field = match source {
         MaterialError::YoungsModulus(_) | MaterialError::Units { .. } => ".youngs_modulus_mpa",
         MaterialError::PoissonsRatio(_) => ".poissons_ratio",
         MaterialError::OgdenTerms { .. }
@@ -58,8 +62,8 @@ pub(crate) fn material_field(error: &TissueError) -> String {
         MaterialError::PronyTerms { .. } | MaterialError::PronyShare(_) => ".prony.share",
         MaterialError::PronyTime(_) => ".prony.time_s",
         MaterialError::Biphasic(e) => {
-            return format!("materials.{}.biphasic.{}", error.tissue, e.field());
+            return format!("materials.{tissue}.biphasic.{}", e.field());
         }
     };
-    format!("materials.{}{field}", error.tissue)
+    format!("materials.{tissue}{field}")
 }

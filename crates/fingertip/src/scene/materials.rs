@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "Given")]
 pub struct TissueTable {
+    /// Tension of the skin at rest, N/mm, in every direction along it; none if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin_tension_n_per_mm: Option<f64>,
     /// Epidermis.
     pub epidermis: MaterialSpec,
     /// Dermis.
@@ -41,6 +44,8 @@ pub enum MaterialSet {
 struct Given {
     /// The set that gives what no table here gives.
     set: MaterialSet,
+    /// Tension of the skin at rest, N/mm, in every direction along it; none if not given.
+    skin_tension_n_per_mm: Option<f64>,
     /// Epidermis.
     epidermis: Option<MaterialSpec>,
     /// Dermis.
@@ -57,6 +62,8 @@ impl From<Given> for TissueTable {
     fn from(given: Given) -> Self {
         let set = given.set.table();
         Self {
+            // No tension is none: it costs nothing and changes no hash.
+            skin_tension_n_per_mm: given.skin_tension_n_per_mm.filter(|t| *t != 0.0),
             epidermis: given.epidermis.unwrap_or(set.epidermis),
             dermis: given.dermis.unwrap_or(set.dermis),
             subcutaneous: given.subcutaneous.unwrap_or(set.subcutaneous),
@@ -72,6 +79,7 @@ impl MaterialSet {
     pub fn table(self) -> TissueTable {
         let elastic = MaterialSpec::elastic;
         let papers = TissueTable {
+            skin_tension_n_per_mm: None,
             epidermis: elastic(0.136, 0.48),
             dermis: MaterialSpec {
                 ogden: Some(OgdenSpec::skin()),
@@ -117,15 +125,28 @@ impl Default for TissueTable {
     }
 }
 
-/// Why a tissue's material was refused.
+/// Why the table of tissues was refused.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
-#[error("materials.{tissue}: {source}")]
-pub struct TissueError {
-    /// Tissue.
-    pub tissue: &'static str,
-    /// What is wrong.
-    pub source: MaterialError,
+pub enum TissueError {
+    /// A tissue's material.
+    #[error("materials.{tissue}: {source}")]
+    Material {
+        /// Tissue.
+        tissue: &'static str,
+        /// What is wrong.
+        source: MaterialError,
+    },
+    /// The tension of the skin.
+    #[error(
+        "materials.skin_tension_n_per_mm = {0} has to be 0 to {TENSION_MAX_N_PER_MM} N/mm; skin of \
+         people has some 0.01, which is 10 N/m"
+    )]
+    Tension(f64),
 }
+
+/// Largest tension of skin that is believed, N/mm: pre-stresses of up to 92 kPa were found in arms
+/// (Flynn, Taberner & Nielsen 2011, abstract), in skin of some 1.2 mm.
+const TENSION_MAX_N_PER_MM: f64 = 1.0;
 
 impl TissueTable {
     /// Entry of a tissue.
@@ -143,11 +164,16 @@ impl TissueTable {
     /// Checks every entry, used or not.
     ///
     /// # Errors
-    /// [`TissueError`] names the tissue and what is out of range.
+    /// [`TissueError`] names the tissue, or the tension, and what is out of range.
     pub(super) fn validate(&self) -> Result<(), TissueError> {
+        if let Some(tension) = self.skin_tension_n_per_mm
+            && !(0.0..=TENSION_MAX_N_PER_MM).contains(&tension)
+        {
+            return Err(TissueError::Tension(tension));
+        }
         for tissue in Tissue::ALL {
             check(self.of(tissue), tissue)
-                .map_err(|source| TissueError { tissue: tissue.name(), source })?;
+                .map_err(|source| TissueError::Material { tissue: tissue.name(), source })?;
         }
         Ok(())
     }

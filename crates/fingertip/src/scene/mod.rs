@@ -245,11 +245,29 @@ impl Scene {
             });
         }
         self.materials.validate()?;
+        self.validate_tension()?;
         if self.has("biphasic") {
             self.biphasic.validate(&self.materials)?;
         }
         self.validate_outputs()?;
         self.plan().map(drop)
+    }
+
+    /// Refuses tension of the skin where nothing is skin, and with what it was not made for.
+    fn validate_tension(&self) -> Result<(), SceneError> {
+        const FIELD: &str = "materials.skin_tension_n_per_mm";
+        if self.materials.skin_tension_n_per_mm.is_none() {
+            return Ok(());
+        }
+        let refuse = |rule| Err(SceneError::Fields { field: FIELD, rule });
+        match &self.geometry {
+            Geometry::Block { .. } => refuse("a block has no skin: leave the tension out"),
+            _ if self.has("biphasic") => refuse(
+                "cannot be combined with the effect \"biphasic\", of which it was not tested \
+                 whether its energy and work agree: leave one of the two out",
+            ),
+            _ => Ok(()),
+        }
     }
 
     /// Whether an effect is named.

@@ -38,6 +38,37 @@ fn a_set_gives_what_no_table_does() {
     assert_refused(&[(unknown, 8, &["pigs", "papers", "people"])]);
 }
 
+#[test]
+fn skin_is_slack_unless_a_scene_says_its_tension() {
+    let with = |tension: &str| format!("{FINGER}[materials]\nskin_tension_n_per_mm = {tension}\n");
+    let scene = parse(&with("0.01")).unwrap();
+    assert_eq!(scene.materials.skin_tension_n_per_mm, Some(0.01));
+    let written = toml::to_string(&scene.materials).unwrap();
+    assert_eq!(toml::from_str::<TissueTable>(&written).unwrap(), scene.materials);
+    // None is the same as no word of it, to the bit of what is hashed.
+    let none = parse(&with("0.0")).unwrap();
+    assert_eq!(none.materials, TissueTable::default());
+    assert!(!toml::to_string(&none.materials).unwrap().contains("tension"));
+    let field = "materials.skin_tension_n_per_mm";
+    let fluid = "[materials.dermis]\nyoungs_modulus_mpa = 0.1\npoissons_ratio = 0.4\nbiphasic = \
+                 { permeability_mm4_per_n_s = 1e-3, drained_poissons_ratio = 0.2 }\n";
+    let biphasic = with("0.01")
+        .replace("depth_mm = 1.0", "path = [{ time_s = 1.0, depth_mm = 1.0 }]")
+        .replace("density", "order = \"quadratic\"\ndensity");
+    assert_refused(&[
+        (with("-0.01"), 8, &[field, "= -0.01", "0 to 1 N/mm"]),
+        (with("11.4"), 8, &[field, "= 11.4", "10 N/m"]),
+        (with("inf"), 8, &[field, "= inf"]),
+        (with("nan"), 8, &[field, "= NaN"]),
+        (
+            format!("{BLOCK}[materials]\nskin_tension_n_per_mm = 0.01\n"),
+            12,
+            &[field, "block has no skin"],
+        ),
+        (format!("effects = [\"biphasic\"]\n{biphasic}{fluid}"), 10, &[field, "\"biphasic\""]),
+    ]);
+}
+
 /// Every set makes laws, stable at rest, with and without its effects; the neo-Hookean law of a
 /// tissue has the modulus that its Ogden law has at rest.
 #[test]

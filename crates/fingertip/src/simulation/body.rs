@@ -147,6 +147,9 @@ impl SimulationError {
             Self::Problem(ProblemError::Missing { .. } | ProblemError::ContactFaces { .. }) => {
                 Some("geometry.contact".into())
             }
+            Self::Problem(ProblemError::Tension(_)) => {
+                Some("materials.skin_tension_n_per_mm".into())
+            }
             Self::Mesh(_) => Some("geometry.file".into()),
             Self::Problem(_) | Self::Recovery(_) => Some("geometry".into()),
             Self::Slipped { .. } => Some("indenter".into()),

@@ -20,7 +20,7 @@ impl Body {
             fluid
                 .map(|f| f.permeability())
                 .transpose()
-                .map_err(|e| TissueError { tissue: source.name(), source: e.into() })
+                .map_err(|e| TissueError::Material { tissue: source.name(), source: e.into() })
         };
         let permeability = Tissue::ALL.into_iter().map(permeability).collect::<Result<_, _>>()?;
         let drained = (skin == SkinFlow::Drained).then(|| self.contact.clone());

@@ -242,6 +242,10 @@ fn tissue(table: &TissueTable) -> String {
     let (name, own) =
         if people.len() < papers.len() { ("people", people) } else { ("papers", papers) };
     let mut text = format!("[tissue]\nset = \"{name}\"\n");
+    if let Some(tension) = table.skin_tension_n_per_mm {
+        text +=
+            &format!("# Tension of the skin at rest, N/mm.\nskin_tension_n_per_mm = {tension:?}\n");
+    }
     for (tissue, spec) in own {
         let inner = toml::Table::try_from(spec).unwrap_or_default();
         let outer = toml::Table::from_iter([(tissue.name().to_owned(), toml::Value::Table(inner))]);

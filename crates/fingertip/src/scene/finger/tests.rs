@@ -37,12 +37,27 @@ fn what_is_written_is_read_as_the_same() {
     finger.shape.bone_tuft_mm = [6.5, 3.25];
     finger.tissue = MaterialSet::People.table();
     finger.tissue.dermis.youngs_modulus_mpa = 0.123;
+    finger.tissue.skin_tension_n_per_mm = Some(0.0123);
     finger.source.who = "a \"name\" with\nlines".into();
     let text = finger.to_toml();
     assert!(text.contains("set = \"people\""), "{text}");
     assert_eq!(parse(&text).unwrap(), finger);
     // Every number says its default and its range.
     assert_eq!(text.matches(", default ").count(), FIELDS.len());
+}
+
+#[test]
+fn tension_of_the_skin_changes_the_hash_where_there_is_some() {
+    let with = |tension: &str| {
+        parse(&format!("[tissue]\nskin_tension_n_per_mm = {tension}\n")).unwrap().sha256()
+    };
+    assert_eq!(with("0.0"), Finger::usual().sha256());
+    assert_ne!(with("0.01"), Finger::usual().sha256());
+    assert_refused(
+        "[tissue]\nskin_tension_n_per_mm = -0.1\n",
+        2,
+        &["tissue.skin_tension_n_per_mm = -0.1"],
+    );
 }
 
 #[test]
