@@ -34,7 +34,7 @@ fn a_record_that_was_simulated_is_fitted_again() {
         asked("fast plate", plate, 0.8, 0.1),
         asked("ball", ball, 1.0, 20.0),
     ];
-    let truth = [0.7, 0.5, 0.4, 0.6, 0.6, 0.5, 0.5, 0.4, 0.4];
+    let truth = [0.7, 0.5, 0.4, 0.6, 0.6, 0.5, 0.5, 0.4, 0.4, 0.2];
     let relaxes = [0.2, 0.4, 0.3];
     let data = Data::recorded(presses.clone());
     let subject = simulated::subject(&Moved::named(&[]), &truth);
