@@ -175,7 +175,9 @@ def training_hours(folder: Path, networks: dict) -> float:
     """Core hours of all epochs that stand in a taught bundle."""
     seconds = 0.0
     for name in set(networks.values()):
-        (history,) = (folder / "teach/runs").glob(f"{name}-????????????/history.csv")
+        # Of several trainings the newest: presses that were solved later change what is learnt.
+        runs = (folder / "teach/runs").glob(f"{name}-????????????/history.csv")
+        history = max(runs, key=lambda path: path.stat().st_mtime)
         with history.open() as lines:
             seconds += sum(float(line["processor_seconds"]) for line in csv.DictReader(lines))
     return seconds / 3600.0
