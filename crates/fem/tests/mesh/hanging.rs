@@ -3,7 +3,9 @@
 use papilla_fem::element::{Elastic, ElementKind, Materials};
 use papilla_fem::mesh::block::even;
 use papilla_fem::mesh::lattice::lattice;
-use papilla_fem::mesh::{HangingNode, Mesh};
+use papilla_fem::mesh::surface::side_nodes;
+use papilla_fem::mesh::{FaceKind, HangingNode, Mesh, Surface};
+use papilla_fem::solve::evaluate::{Evaluation, Trial, evaluate_body};
 use papilla_fem::solve::{Loading, Options, Problem, Solver};
 use papilla_solid::NeoHookean;
 
@@ -124,5 +126,84 @@ fn the_patch_test_is_passed_to_rounding() {
     for (p, u) in nodes.iter().zip(solver.displacement_mm()) {
         let due = field(*p);
         assert!((0..3).all(|i| (due[i] - u[i]).abs() < 1e-9), "{p:?}: {u:?} {due:?}");
+    }
+}
+
+/// The faces of a joined mesh at z = 1, on which nodes hang.
+fn lid(mesh: &Mesh) -> Surface {
+    let (kind, block) = (ElementKind::Hex27, &mesh.blocks[0]);
+    let mut connectivity = Vec::new();
+    for element in (0..block.len()).map(|e| block.element(e)) {
+        for side in 0..kind.sides().len() {
+            let face: Vec<u32> = side_nodes(kind, side).into_iter().map(|l| element[l]).collect();
+            if face.iter().all(|&n| mesh.nodes[n as usize][2] > 1.0 - 1e-9) {
+                connectivity.extend(face);
+            }
+        }
+    }
+    Surface { kind: FaceKind::Quad9, connectivity }
+}
+
+/// A surface under tension across the joint: forces are the derivative of the energy, and the tangent
+/// that of the forces, where nodes hang too.
+#[test]
+fn tension_follows_the_nodes_that_hang() {
+    const STEP: f64 = 1e-4;
+    let mut mesh = joined();
+    let surface = lid(&mesh);
+    assert_eq!(surface.faces().count(), 3);
+    assert!(mesh.hanging.iter().any(|h| surface.connectivity.contains(&h.node)));
+    mesh.surfaces.insert("lid".into(), surface);
+    let law = NeoHookean { mu_mpa: 0.3 };
+    let models = [0; 5].map(|_| Elastic::shared(law, 4.0)).into();
+    let materials = Materials::new(models).with_tension("lid", 2.0);
+    let count = mesh.nodes.len();
+    let problem = Problem::new(mesh, materials, vec![false; 3 * count], None).unwrap();
+    let follow = |mut u: Vec<[f64; 3]>| {
+        for h in &problem.mesh.hanging {
+            u[h.node as usize] = h.of(|m| u[m as usize]);
+        }
+        u
+    };
+    let nodes = problem.mesh.nodes.iter();
+    let start =
+        follow(nodes.clone().map(|[x, y, z]| [0.1 * z * y, 0.05 * x * x, 0.1 * y]).collect());
+    let way = follow(nodes.map(|[x, y, z]| [y * y, z - x * y, x + y * z * z]).collect());
+    let evaluate = |t: f64| {
+        let u: Vec<[f64; 3]> =
+            start.iter().zip(&way).map(|(u, w)| [0, 1, 2].map(|i| u[i] + t * w[i])).collect();
+        let trial = Trial {
+            u: &u,
+            independent: &[],
+            multipliers_mpa: &[],
+            penalty: 1.0,
+            load_fraction: 0.0,
+            variables: Default::default(),
+            friction: None,
+            fluid: None,
+        };
+        let (mut tangent, mut out) = (problem.system.zeros(), Evaluation::default());
+        evaluate_body(&problem, &Loading::default(), &trial, Some(&mut tangent), &mut out).unwrap();
+        (out, tangent)
+    };
+    let ((at, tangent), (up, _), (down, _)) = (evaluate(0.0), evaluate(STEP), evaluate(-STEP));
+    let slack = at.stored_mj - problem.tension.as_ref().unwrap().energy_mj(&start);
+    assert!(slack < 0.8 * at.stored_mj, "tension hardly matters: {slack} of {}", at.stored_mj);
+    let along: f64 = at.residual_n.iter().zip(way.as_flattened()).map(|(r, w)| r * w).sum();
+    let slope = (up.potential_mj - down.potential_mj) / (2.0 * STEP);
+    assert!((slope / along - 1.0).abs() < 1e-6, "{slope} {along}");
+    let dofs = &problem.system.dofs;
+    let mut unknowns = vec![0.0; dofs.count];
+    let mut product = unknowns.clone();
+    let free = |d: &usize| dofs.of_dof[*d] != papilla_fem::linear::DofMap::FIXED;
+    for d in (0..3 * count).filter(free) {
+        unknowns[dofs.of_dof[d] as usize] = way.as_flattened()[d];
+    }
+    problem.system.multiply(&tangent, &unknowns, &mut product);
+    let largest = product.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    for d in (0..3 * count).filter(free) {
+        let slope = (up.residual_n[d] - down.residual_n[d]) / (2.0 * STEP);
+        let found = product[dofs.of_dof[d] as usize];
+        assert!((slope - found).abs() < 1e-6 * largest, "{d}: {slope} {found}");
     }
 }
