@@ -139,8 +139,13 @@ fn template_places(shape: &FingertipShape) -> anyhow::Result<Vec<[f32; 3]>> {
     Ok(atlas.patch(Patch::Skin).positions_mm.clone())
 }
 
-/// Skin from the surface down to the bone, below the middle of the pad.
+/// Skin from the surface down to the bone, below the middle of the pad. None of skin under tension:
+/// the closed form of plane layers has none, and without layers the service takes a method that needs
+/// no closed form.
 fn layers_below_pad(shape: &FingertipShape, tissues: &TissueTable) -> anyhow::Result<Vec<Layer>> {
+    if tissues.skin_tension_n_per_mm.is_some() {
+        return Ok(Vec::new());
+    }
     let bounds = shape.layers(SurfaceParameter::Body([0.0, -1.0], 0.0))?;
     let tissue = [Tissue::Epidermis, Tissue::Dermis, Tissue::Subcutaneous];
     let layer = |(tissue, ends): (Tissue, &[[f64; 3]])| {
@@ -237,5 +242,18 @@ fn arrays(
         projection: second.projection,
         products: second.products,
         displacements: second.displacements,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn skin_under_tension_is_no_stack_of_plane_layers() {
+        let Finger { shape, mut tissue, .. } = Finger::usual();
+        assert_eq!(layers_below_pad(&shape, &tissue).unwrap().len(), 3);
+        tissue.skin_tension_n_per_mm = Some(0.01);
+        assert!(layers_below_pad(&shape, &tissue).unwrap().is_empty());
     }
 }
