@@ -202,6 +202,15 @@ impl Law {
         LikelyError { median: median.exp(), p90: bound.exp() }
     }
 
+    /// Whether the centre of pressure lies further out than in any simulation of the calibration. There
+    /// nothing has checked the network, and what it answers under a narrow object is often wrong.
+    #[must_use]
+    pub fn is_beyond_place(&self, facts: &Facts) -> bool {
+        let places = [Fact::Tip, Fact::Side, Fact::Heel];
+        let mut terms = self.terms.iter().filter(|term| places.contains(&term.fact));
+        terms.any(|term| facts.get(term.fact) > term.most)
+    }
+
     /// Whether a fact is not known, or lies outside the range of the calibration.
     #[must_use]
     pub fn is_beyond(&self, facts: &Facts) -> bool {
@@ -357,6 +366,35 @@ mod tests {
                 assert!((frame.get(fact) - due).abs() < 0.01, "{fact:?} {}", frame.get(fact));
             }
         }
+    }
+
+    #[test]
+    fn only_a_place_beyond_the_calibration_makes_an_answer_unfamiliar() {
+        let term = |fact, most| Term { fact, least: -0.1, most, median: 0.0, bound: 0.0 };
+        let terms = vec![term(Fact::Load, 1.0), term(Fact::Heel, 0.2), term(Fact::Side, 0.1)];
+        let law = Law { median: -2.0, bound: 0.1, terms };
+        let known = Look::of(&ball(1e4, [111.5, 111.5], 90.0)).statistics.cells;
+        let at = |peak_pa: f32, place| {
+            let look = Look::of(&ball(peak_pa, place, 10.0));
+            law.is_beyond_place(&Facts::of_sed(&look, peak_pa, 1e5, known))
+        };
+        // 1.2 times 40 px towards the hand are within the calibration, and so are .6 times to a side.
+        for (place, due) in [
+            ([111.5, 111.5], false),
+            ([111.5, 158.0], false),
+            ([111.5, 161.0], true),
+            ([135.0, 111.5], false),
+            ([138.0, 111.5], true),
+            ([85.0, 111.5], true),
+            // Nothing is calibrated towards the tip.
+            ([111.5, 30.0], false),
+        ] {
+            // However light or hard the touch is.
+            for peak_pa in [200.0, 2e4, 2e6] {
+                assert_eq!(at(peak_pa, place), due, "{peak_pa} Pa at {place:?}");
+            }
+        }
+        assert!(!law.is_beyond_place(&Facts::default()), "a place that is not known is no reason");
     }
 
     #[test]

@@ -140,7 +140,32 @@ impl<'a> Rendering<'a> {
         let sed = self.maps.tell_sed();
         self.flags |= self.maps.judge_answer(sed, self.known.response_max_per_mpa);
         self.sed = Some(sed);
+        if self.is_beyond_calibration() {
+            self.flags |= flags::UNFAMILIAR;
+        }
         Ok(())
+    }
+
+    /// Whether the pressure lies where no simulation has checked the network. Where the law for this
+    /// way to the pressure is missing, that for a given pressure decides.
+    fn is_beyond_calibration(&self) -> bool {
+        let Some(KnownErrors { laws, onnx_sha256: Some(network) }) = self.known.errors else {
+            return false;
+        };
+        let way = self.way().unwrap_or(Way::Given);
+        let law = laws.sed(network, way).or_else(|| laws.sed(network, Way::Given));
+        law.is_some_and(|law| law.is_beyond_place(&self.facts()))
+    }
+
+    /// Where the pressure came from, if errors may be known of it.
+    fn way(&self) -> Option<Way<'_>> {
+        let model = self.finger.as_ref().and_then(|finger| finger.model_sha256());
+        match (self.read.source, model) {
+            _ if self.is_changed || !self.read.is_tracked => None,
+            (Source::Map, _) => Some(Way::Given),
+            (Source::Contact(felt), Some(model)) => Some(Way::Contact(felt.method, model)),
+            (Source::Contact(_), None) | (Source::Other, _) => None,
+        }
     }
 
     /// The facts of the answer by which its error is estimated. They are unknown before there is an
@@ -159,13 +184,7 @@ impl<'a> Rendering<'a> {
         let Some(KnownErrors { laws, onnx_sha256 }) = self.known.errors else {
             return ErrorEstimate::default();
         };
-        let model = self.finger.as_ref().and_then(|finger| finger.model_sha256());
-        let way = match (self.read.source, model) {
-            _ if self.is_changed || !self.read.is_tracked => None,
-            (Source::Map, _) => Some(Way::Given),
-            (Source::Contact(felt), Some(model)) => Some(Way::Contact(felt.method, model)),
-            (Source::Contact(_), None) | (Source::Other, _) => None,
-        };
+        let way = self.way();
         let sed = onnx_sha256.zip(way).and_then(|(network, way)| laws.sed(network, way));
         let unlike = flags::UNFAMILIAR | flags::CUT_OFF | flags::UNSETTLED;
         let is_within =

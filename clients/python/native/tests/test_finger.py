@@ -58,6 +58,27 @@ def test_touch_is_that_of_a_session_to_the_bit(base, terms, net):
     assert max(rounds) > 0 and contact.force_n[2] > 0.02
 
 
+def test_what_presses_near_the_joint_is_unfamiliar():
+    """No simulation with its centre there has checked the networks: narrow objects make them err by a third."""
+    ball = {"shape": {"shape": "sphere", "radius_mm": 3.0}}
+
+    def pressed(session, along_mm):
+        for height_mm in np.arange(-10.5, -6.0, 0.1):
+            answer = session.touch([along_mm, 0.0, height_mm, 0, 0, 0, 1])
+            if answer.touch.force_n[2] > 0.04:
+                return answer
+        raise AssertionError("the ball does not meet the finger")
+
+    with papilla.local(input="objects", objects=[ball]) as session:
+        assert not pressed(session, 11.25).unfamiliar
+        assert pressed(session, 19.5).unfamiliar
+    with papilla.local() as session:
+        rows, columns = np.mgrid[:224, :224]
+        for row, unfamiliar in ((110, False), (170, True)):
+            disc = (rows - row) ** 2 + (columns - 112) ** 2 < 12.0**2
+            assert session.render(np.where(disc, 1.5e4, 0.0).astype(np.float32)).unfamiliar == unfamiliar
+
+
 def test_gaps_are_those_of_a_session_to_the_bit(base):
     rows, columns = np.mgrid[:224, :224]
     depth_mm = (0.8 - ((rows - 104) ** 2 + (columns - 112) ** 2) / 1000.0).astype(np.float32)
