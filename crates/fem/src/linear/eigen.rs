@@ -14,8 +14,8 @@ pub(crate) fn eigen<const N: usize>(mut a: [[f64; N]; N]) -> ([f64; N], [[f64; N
                     continue;
                 }
                 let tau = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-                let t = tau.signum() / (tau.abs() + tau.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
+                let t = tau.signum() / (tau.abs() + (1.0 + tau * tau).sqrt());
+                let c = 1.0 / (1.0 + t * t).sqrt();
                 let s = t * c;
                 for k in 0..N {
                     (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);

@@ -33,9 +33,11 @@ fn rotate(a: &mut Mat3, v: &mut Mat3, p: usize, q: usize) {
         a[q][p] = 0.0;
         return;
     }
+    // Roots, not `hypot`, which took a quarter of a simulation of Ogden's law. Where `tau` squared is no
+    // number, the turn is too small to be one.
     let tau = (a[q][q] - a[p][p]) / (2.0 * off);
-    let t = tau.signum() / (tau.abs() + tau.hypot(1.0));
-    let c = 1.0 / t.hypot(1.0);
+    let t = tau.signum() / (tau.abs() + (1.0 + tau * tau).sqrt());
+    let c = 1.0 / (1.0 + t * t).sqrt();
     let s = t * c;
     let r = 3 - p - q;
     a[p][p] -= t * off;
