@@ -31,6 +31,9 @@ pub struct KnownErrors<'a> {
     /// SHA-256 of the network's file; none if the network belongs to another finger, for whose SED
     /// no error is estimated.
     pub onnx_sha256: Option<&'a str>,
+    /// Whether the client asked for the error of its answers. The laws flag what lies beyond their
+    /// calibration in any case.
+    pub is_asked: bool,
 }
 
 /// Where the pressure of a frame comes from.
@@ -149,7 +152,7 @@ impl<'a> Rendering<'a> {
     /// Whether the pressure lies where no simulation has checked the network. Where the law for this
     /// way to the pressure is missing, that for a given pressure decides.
     fn is_beyond_calibration(&self) -> bool {
-        let Some(KnownErrors { laws, onnx_sha256: Some(network) }) = self.known.errors else {
+        let Some(KnownErrors { laws, onnx_sha256: Some(network), .. }) = self.known.errors else {
             return false;
         };
         let way = self.way().unwrap_or(Way::Given);
@@ -181,7 +184,7 @@ impl<'a> Rendering<'a> {
     /// How wrong the answer is likely to be. To be called before [`end`](Self::end).
     #[must_use]
     pub fn error_estimate(&self) -> ErrorEstimate {
-        let Some(KnownErrors { laws, onnx_sha256 }) = self.known.errors else {
+        let Some(KnownErrors { laws, onnx_sha256, is_asked: true }) = self.known.errors else {
             return ErrorEstimate::default();
         };
         let way = self.way();

@@ -325,11 +325,11 @@ impl Session {
             skin: &model.bundle.pixels,
             input_max: of.card.input_statistics_max,
             response_max_per_mpa: of.card.response_max_per_mpa,
-            errors: model
-                .error_laws
-                .as_ref()
-                .filter(|_| tells_error)
-                .map(|laws| KnownErrors { laws, onnx_sha256: Some(&of.card.onnx_sha256) }),
+            errors: model.error_laws.as_ref().map(|laws| KnownErrors {
+                laws,
+                onnx_sha256: Some(&of.card.onnx_sha256),
+                is_asked: tells_error,
+            }),
         };
         let read = Read { summary, range: *range, time_us, is_tracked, shows_sed, source };
         let mut rendering =

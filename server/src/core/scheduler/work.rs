@@ -189,8 +189,9 @@ impl Worker {
             skin: &catalogue.skin_pixels,
             input_max: tier.input_statistics_max,
             response_max_per_mpa: tier.response_max_per_mpa,
-            errors: catalogue.error_laws.as_ref().filter(|_| tells_error).map(|laws| KnownErrors {
+            errors: catalogue.error_laws.as_ref().map(|laws| KnownErrors {
                 laws,
+                is_asked: tells_error,
                 // The error laws do not hold for a network that was trained on another finger.
                 onnx_sha256: tier.trained_on.is_none().then_some(&tier.onnx_sha256),
             }),
