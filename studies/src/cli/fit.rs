@@ -28,7 +28,7 @@ pub(super) struct Args {
     /// Only this part beside the constants (constants, halves, taps, rows); may be given several times.
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
-    /// Only move these constants (fat, exponent, dermis, epidermis, pulp, bone, crease, thickness, nail);
+    /// Only move these constants (fat, exponent, dermis, epidermis, pulp, bone, crease, thickness, nail, tension);
     /// may be given several times.
     #[arg(long = "move", value_name = "CONSTANT")]
     moved: Vec<String>,
