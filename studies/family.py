@@ -22,8 +22,6 @@ or PATH. Every step goes on where it was stopped. Run it in the root of the repo
 
 import argparse
 import json
-import os
-import shutil
 import subprocess
 import sys
 import time
@@ -32,6 +30,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from fingers import JUDGES as DEFAULT_DATA
+from fingers import program
 from torch import nn
 from torch.func import functional_call
 
@@ -49,7 +49,6 @@ from papilla_trainer.start import Start  # noqa: E402
 
 SEQUENCE = ROOT / "campaigns/teach.toml"
 START = ROOT / "models/small-maps.onnx"
-DEFAULT_DATA = ROOT / "data/broad-graded"
 JUDGES = ("child", "index", "thumb")
 # Fingers that are drawn, and how many of them choose.
 FINGERS, CHOOSING = 36, 6
@@ -68,13 +67,6 @@ VARIANTS = (
 # Of a level what it takes over from the one above, and how its kernels vary over the finger.
 FEW = ("mix", "over_finger")
 NUMBERS = ("epidermis", "dermis", "pulp", "height", "length", "bone width", "bone tip", "nail width", "tip's shape")
-
-
-def program(variable: str, name: str) -> str:
-    found = shutil.which(os.environ.get(variable, name))
-    if found is None:
-        sys.exit(f"there is no program {name}: build it, and name it by {variable}")
-    return found
 
 
 def drawn(seed: int) -> dict:
@@ -254,7 +246,7 @@ class Family(nn.Module):
         return total
 
 
-class Fingers:
+class FingerMaps:
     """Maps of one finger's states, with its numbers and the loss over its interface."""
 
     def __init__(self, t: np.ndarray, pressure_pa: np.ndarray, sed: np.ndarray, interface: np.ndarray) -> None:
@@ -264,10 +256,10 @@ class Fingers:
         self.loss = make_loss("relative", self.interface, FAR_WEIGHT)
 
     @staticmethod
-    def drawn(folder: Path, usual: dict) -> "Fingers":
+    def drawn(folder: Path, usual: dict) -> "FingerMaps":
         read = [np.load(folder / f"maps/{name}.npy") for name in ("pressure_pa", "sed_j_per_m3", "interface")]
         touched = read[1].any(axis=(1, 2))
-        return Fingers(numbers(explained(folder), usual), read[0][touched], read[1][touched], read[2])
+        return FingerMaps(numbers(explained(folder), usual), read[0][touched], read[1][touched], read[2])
 
     @torch.no_grad()
     def errors(self, family: Family) -> np.ndarray:
@@ -277,18 +269,18 @@ class Fingers:
         return (norms[0] / norms[1]).numpy()
 
 
-def all_fingers(options) -> tuple[list[Fingers], list[Fingers], Fingers]:
+def all_fingers(options) -> tuple[list[FingerMaps], list[FingerMaps], FingerMaps]:
     """To learn from, to choose by, and the default finger."""
     usual = explained(ROOT / "models")
     folders = sorted(path.parent for path in options.out.glob("[0-9][0-9][0-9]/maps"))[: options.fingers]
-    found = [Fingers.drawn(folder, usual) for folder in folders]
+    found = [FingerMaps.drawn(folder, usual) for folder in folders]
     default = Dataset(DEFAULT_DATA, Store())
     maps = default.load(default.train_ids)
-    own = Fingers(np.zeros(len(NUMBERS)), maps.pressure_pa, maps.sed_j_per_m3, default.mask())
+    own = FingerMaps(np.zeros(len(NUMBERS)), maps.pressure_pa, maps.sed_j_per_m3, default.mask())
     return found[CHOOSING:], found[:CHOOSING], own
 
 
-def epoch(family: Family, optimizer, learnt: list[Fingers], own: Fingers, penalty: float, lot) -> None:
+def epoch(family: Family, optimizer, learnt: list[FingerMaps], own: FingerMaps, penalty: float, lot) -> None:
     """Each finger once, in turn with as many states of the default finger for every fourth."""
     for place in torch.randperm(len(learnt), generator=lot).tolist():
         batches = [(learnt[place], learnt[place].pressure_pa, learnt[place].sed)]
@@ -360,25 +352,31 @@ def written(family: Family, judge: Served, t: np.ndarray, out: Path, training: d
     return write_model(to_onnx(model), props, out)
 
 
+def relative_l2(model: Path, folder: Path, *more: str) -> dict:
+    """Median and 95th percentile on the held-out presses of a dataset."""
+    words = [program("MODEL_EXPORT", "model-export"), "--json", "evaluate", str(model), str(folder), *more]
+    done = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True)
+    return json.loads(done.stdout)["card"]["metrics"]["relative_l2"]
+
+
 def measure(options) -> None:
     """On presses of fingers that no variant has seen; the variant is the one that chose best."""
-    export, usual = program("MODEL_EXPORT", "model-export"), explained(ROOT / "models")
+    usual = explained(ROOT / "models")
+    judges = {name: options.judges / f"{name}-held-out/judge" for name in JUDGES}
+    alone = {name: relative_l2(START, folder, "--similarity") for name, folder in judges.items()}
     notes = [json.loads((options.out / f"{name}.json").read_text()) for name, *_ in VARIANTS]
     best = min(notes, key=lambda note: note["chosen_by"])["variant"]
     found = []
     for note in notes:
-        family = Family(Start.read(START), note["by_numbers"], note.get("few", False))
+        family = Family(Start.read(START), note["by_numbers"], note["few"])
         family.load_state_dict(torch.load(options.out / f"{note['variant']}.pt", weights_only=True))
-        for name in options.judges_named:
-            folder = options.judges / f"{name}-held-out/judge"
+        for name in JUDGES:
+            folder = judges[name]
             t = numbers(explained(options.judges / name), usual)
             training = {"start": Start.read(START).record(), "family": note}
             onnx = written(family, served(folder), t, options.out / f"{note['variant']}-{name}.onnx", training)
             row = {"variant": note["variant"], "chosen": note["variant"] == best, "finger": name}
-            for key, file, more in (("family", onnx, []), ("similarity", START, ["--similarity"])):
-                words = [export, "--json", "evaluate", str(file), str(folder), *more]
-                done = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True)
-                row[key] = json.loads(done.stdout)["card"]["metrics"]["relative_l2"]
+            row |= {"family": relative_l2(onnx, folder), "similarity": alone[name]}
             found.append(row)
             print(json.dumps(row), file=sys.stderr, flush=True)
     (options.out / "family.json").write_text(json.dumps({"variants": notes, "judges": found}, indent=2) + "\n")
@@ -393,7 +391,7 @@ def main() -> None:
     parser.add_argument("--epochs", type=int, default=EPOCHS, help="passes over all fingers")
     parser.add_argument("--judges", type=Path, default=ROOT / "out/fingers", help="folder of studies/fingers.py")
     options = parser.parse_args()
-    options.out, options.judges_named = options.out.resolve(), JUDGES
+    options.out = options.out.resolve()
     steps = {"solve": solve, "train": train, "measure": measure}
     for name in [options.step] if options.step else steps:
         steps[name](options)

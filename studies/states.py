@@ -25,28 +25,29 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "model-export/trainer")]
 
+from papilla_trainer.comparison.measures import Zones, measure  # noqa: E402
 from papilla_trainer.config import TrainConfig  # noqa: E402
-from papilla_trainer.dataset import Dataset, Press, State  # noqa: E402
-from papilla_trainer.maps import F32, DrawnMaps, Store  # noqa: E402
+from papilla_trainer.dataset import Dataset, Press, State, View  # noqa: E402
+from papilla_trainer.maps import Store  # noqa: E402
 from papilla_trainer.serving import predict, served_model  # noqa: E402
 from papilla_trainer.training import Trainer  # noqa: E402
 
 PLATES = ROOT / "data/s1-graded"
 # The states are 0.25, 0.5, ..., 2 mm deep. A plate's deepest one is one of these, counted from 1.
 DEEPEST = (2, 4, 6, 8)
-# What a simulation with so many states costs: one with two is 1.
-COST = {2: 1.0, 3: 1.35, 4: 1.7}
+# What each state beyond the second costs: a simulation with two is 1.
+ONE_MORE = 0.35
+STATES = (2, 3, 4)
 ALL = 100
 SAMPLES = 20_000
 SETTINGS = {"network": "map-c4-k3-r32-h4", "loss": "relative", "learning_rate": 3e-3, "schedule": "cosine", "batch": 8, "shift_px": 3}
 
 
-class Kept(Dataset):
+class Kept(View):
     """So many simulations of a dataset with some of their states. The simulations for testing keep all."""
 
     def __init__(self, whole: Dataset, simulations: int, states: int, seed: int) -> None:
-        self._take_over(whole)
-        self.whole = whole
+        super().__init__(whole)
         deepest = np.random.default_rng([seed, 0xDEE9]).choice(DEEPEST, len(whole.train_ids))
         self.kept = {i: kept(states, deepest[k]) for k, i in enumerate(whole.train_ids)}
         lot = np.random.default_rng([seed, 0x57A7]).permutation(len(whole.train_ids))
@@ -55,12 +56,9 @@ class Kept(Dataset):
         few = {i: Press(i, sum(s.state in self.kept[i] for s in whole.states([i]))) for i in self.train_ids}
         self.presses = {**{i: whole.presses[i] for i in whole.test_ids}, **few}
 
-    @property
-    def drawn(self) -> DrawnMaps:  # type: ignore[override]
-        return self.whole.drawn
-
-    def mask(self) -> F32:
-        return self.whole.mask()
+    def cost(self) -> float:
+        """Processor time of its simulations, that of ALL with two states being 1."""
+        return sum(1.0 + ONE_MORE * (self.presses[i].samples - 2) for i in self.train_ids) / ALL
 
     def states(self, ids: list[int]) -> list[State]:
         own = set(self.train_ids)
@@ -68,24 +66,23 @@ class Kept(Dataset):
 
 
 def kept(states: int, deepest: int) -> set[int]:
-    """Which states are kept: evenly spaced down to the deepest."""
+    """Which states are kept: evenly spaced down to the deepest, as far as so many are stored."""
     return {round(deepest * k / states) - 1 for k in range(1, states + 1)} - {-1}
 
 
 def runs() -> list[tuple[str, int, int]]:
     """Name, simulations, and states of each."""
-    counts = {(count, states) for states, cost in COST.items() for count in (ALL, round(ALL / cost))}
+    fewer = {k: round(ALL / (1.0 + ONE_MORE * (k - 2))) for k in STATES}
+    counts = {(count, states) for states in STATES for count in (ALL, fewer[states])}
     return [(f"own-{count}x{states}", count, states) for count, states in sorted(counts, key=lambda of: (of[1], of[0]))]
 
 
 def errors(trainer: Trainer, whole: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Relative L2 norm of each state that is set aside, and its depth, mm."""
-    model, inside = served_model(trainer.state, "last"), whole.mask() > 0
+    model, zones = served_model(trainer.state, "last"), Zones.of(whole)
     states = whole.states(whole.test_ids)
-    found = []
-    for state in states:
-        off = predict(model, state.pressure_pa[None].copy())[0][inside] - state.sed_j_per_m3[inside]
-        found.append(np.linalg.norm(off) / np.linalg.norm(state.sed_j_per_m3[inside]))
+    maps = ((predict(model, state.pressure_pa[None].copy())[0], state.sed_j_per_m3) for state in states)
+    found = [measure(map_, truth, zones)["relative_l2"] for map_, truth in maps]
     return np.array(found), np.array([state.depth_mm for state in states])
 
 
@@ -102,7 +99,7 @@ def measured(whole: Dataset, out: Path, seed: int, name: str, simulations: int, 
     parts = {"all": depth > 0, "to_1_mm": depth < 1.01, "deeper": depth > 1.01}
     spread = {key: [float(np.percentile(off[rows], q)) for q in (50, 95)] for key, rows in parts.items()}
     seconds = sum(line["processor_seconds"] for line in trainer.state.history)
-    row = {"run": name, "seed": seed, "simulations": simulations, "states": states, "cost": simulations * COST[states] / ALL, **spread, "processor_s": seconds}
+    row = {"run": name, "seed": seed, "simulations": simulations, "states": states, "cost": view.cost(), **spread, "processor_s": seconds}
     note.write_text(json.dumps(row) + "\n")
     print(json.dumps(row), file=sys.stderr, flush=True)
     return row

@@ -137,6 +137,23 @@ class Dataset:
         return Maps.of(self.states(ids))
 
 
+class View(Dataset):
+    """The simulations of another dataset, shared out in another way."""
+
+    def __init__(self, whole: Dataset) -> None:
+        self._take_over(whole)
+        self.whole = whole
+
+    @property
+    def drawn(self) -> DrawnMaps:  # type: ignore[override]
+        """The maps of the whole dataset."""
+        return self.whole.drawn
+
+    def mask(self) -> F32:
+        """As of the whole dataset."""
+        return self.whole.mask()
+
+
 def validation_split(train_ids: list[int], count: int, seed: int) -> tuple[list[int], list[int]]:
     """Set ``count`` *train* indentations aside to choose the epoch by; the test ones stay."""
     if not 0 <= count < len(train_ids):

@@ -9,30 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from papilla_trainer.dataset import Dataset, Press, State
-from papilla_trainer.maps import F32, DrawnMaps
+from papilla_trainer.dataset import Dataset, Press, State, View
 
 
-class SplitBySample(Dataset):
+class SplitBySample(View):
     """As many states for testing as ``whole`` has, drawn by lot. Press 7 is the state in row 7."""
 
     def __init__(self, whole: Dataset, seed: int) -> None:
-        self._take_over(whole)
-        self.whole = whole
+        super().__init__(whole)
         states = sum(press.samples for press in whole.presses.values())
         tests = sum(whole.presses[i].samples for i in whole.test_ids)
         self.presses = {row: Press(row, 1) for row in range(states)}
         order = np.random.default_rng([seed, 0x5A3B]).permutation(states).tolist()
         self.test_ids, self.train_ids = sorted(order[:tests]), sorted(order[tests:])
-
-    @property
-    def drawn(self) -> DrawnMaps:  # type: ignore[override]
-        """The maps of the whole dataset."""
-        return self.whole.drawn
-
-    def mask(self) -> F32:
-        """As of the whole dataset."""
-        return self.whole.mask()
 
     def states(self, ids: list[int]) -> list[State]:
         """The states in these rows."""
