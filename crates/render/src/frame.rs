@@ -3,7 +3,7 @@
 use papilla_engine::error_law::{ErrorLaws, Facts, Way};
 use papilla_engine::{EngineError, Session};
 use papilla_proto::{
-    ErrorEstimate, InputStatistics, LikelyError, MapSummary, PressureRange, flags, map::PeakAndSum,
+    ErrorEstimate, InputStatistics, LikelyError, MapSummary, PressureRange, flags,
 };
 use papilla_session_contact::{Felt, Finger, Taken};
 use papilla_session_effects::Effects;
@@ -77,8 +77,8 @@ pub struct Rendering<'a> {
     read: Read,
     touches: bool,
     flags: u8,
-    /// The greatest SED and the sum of SED, once the network has answered.
-    sed: Option<PeakAndSum>,
+    /// What the answer shows, once the network has answered; unknown if its training is not known.
+    facts: Option<Facts>,
     /// Whether an effect changes the tissue; no law of errors was calibrated for that.
     is_changed: bool,
 }
@@ -113,7 +113,7 @@ impl<'a> Rendering<'a> {
             flags |= flags::CUT_OFF;
         }
         let is_changed = effects.as_ref().is_some_and(|effects| effects.changes_tissue());
-        Self { maps, finger, effects, known, read, touches, flags, sed: None, is_changed }
+        Self { maps, finger, effects, known, read, touches, flags, facts: None, is_changed }
     }
 
     /// Whether the network is to run: SED is wanted, and something presses.
@@ -142,7 +142,8 @@ impl<'a> Rendering<'a> {
         self.maps.infer(session)?;
         let sed = self.maps.tell_sed();
         self.flags |= self.maps.judge_answer(sed, self.known.response_max_per_mpa);
-        self.sed = Some(sed);
+        let trained = self.known.input_max;
+        self.facts = Some(trained.map_or_else(Facts::default, |of| self.maps.facts(sed, of)));
         if self.is_beyond_calibration() {
             self.flags |= flags::UNFAMILIAR;
         }
@@ -175,10 +176,7 @@ impl<'a> Rendering<'a> {
     /// answer, and for a network whose training is not known.
     #[must_use]
     pub fn facts(&self) -> Facts {
-        let Some((sed, trained)) = self.sed.zip(self.known.input_max) else {
-            return Facts::default();
-        };
-        self.maps.facts(sed, trained)
+        self.facts.unwrap_or_default()
     }
 
     /// How wrong the answer is likely to be. To be called before [`end`](Self::end).
@@ -193,7 +191,7 @@ impl<'a> Rendering<'a> {
         let is_within =
             !self.read.range.is_left_by(self.read.summary) && !self.maps.is_full_scale();
         let is_like = self.flags & unlike == 0 && is_within;
-        let sed = sed.filter(|_| is_like && self.sed.is_some()).map(|law| law.at(&self.facts()));
+        let sed = sed.filter(|_| is_like && self.facts.is_some()).map(|law| law.at(&self.facts()));
         let force = match (self.read.source, way.and_then(|way| laws.force(way))) {
             (Source::Contact(felt), Some(law)) if self.flags & flags::CUT_OFF == 0 => {
                 Some(law.at(&facts_of_force(felt)))
