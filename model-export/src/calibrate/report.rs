@@ -73,7 +73,7 @@ fn percent(value: f64) -> String {
 }
 
 fn sets(text: &mut String) {
-    text.push_str("## Sets\n\nWords in italics are the names of these sets on [other pages](../concepts/accuracy.md#test-sets).\n\n| set | what it holds | group |\n|---|---|---|\n");
+    text.push_str("## Sets\n\nWords in italics are the names of these sets on [other pages](../concepts/accuracy.md#test-sets).\nThe page on the [dataset](../reference/dataset.md#which-data-there-are) says more of shapes.\n\n| set | what it holds | group |\n|---|---|---|\n");
     for set in SETS {
         let _ = writeln!(text, "| `{}` | {} | {} |", set.folder, set.about, set.group);
     }
