@@ -23,9 +23,9 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
         let _ = writeln!(
             text,
             "The SED of the reference itself errs by about {} (relative L2 norm). This was estimated by {}\n\
-             ([more](../concepts/accuracy.md#two-truths)). On the sets whose truth is the reference, smaller differences between\n\
-             ways mean nothing. On all others a smaller difference says which way is nearer to the teacher. It does\n\
-             not say which is nearer to the reference.\n",
+             ([more](../concepts/accuracy.md#two-truths)). On the sets whose truth is the reference, differences between ways that\n\
+             are smaller than this error mean nothing. On all others they say which way is nearer to the teacher, and not\n\
+             which is nearer to the reference.\n",
             percent(floor.sed_relative_l2),
             floor.how
         );
