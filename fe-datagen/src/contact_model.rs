@@ -8,7 +8,7 @@ use papilla_dataset::{Dataset, Field, Maps, Shard, Split};
 use papilla_fingertip::geometry::fingertip::{FingertipShape, SurfaceParameter};
 use papilla_fingertip::influence::{self, Compliance, Load, SecondOrder};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
-use papilla_fingertip::scene::{Finger, TissueTable};
+use papilla_fingertip::scene::{EffectName, Finger, TissueTable};
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::tissue::Tissue;
 use papilla_vector::norm;
@@ -103,7 +103,11 @@ pub(crate) fn make(
     let header = Header {
         software: concat!("fe-datagen ", env!("CARGO_PKG_VERSION")).into(),
         atlas_hash: compliance.atlas_hash.clone(),
-        effects: vec!["finite_strain".into(), "layers".into()],
+        effects: ["finite_strain", "layers"]
+            .into_iter()
+            .chain(tissue.needs.iter().map(EffectName::as_str))
+            .map(Into::into)
+            .collect(),
         datasets,
         vertices,
         triangles: atlas.triangles().len(),

@@ -35,12 +35,14 @@ pub struct Options {
 }
 
 impl Options {
-    /// The finger that is pressed. Of a finger's own constants `materials` says which laws take them.
+    /// The finger that is pressed. Of a finger's own constants `materials` says which laws take them,
+    /// unless they were fitted with Ogden's.
     fn subject(&self) -> Subject {
         let usual = self.materials.subject();
         match &self.finger {
             Some((_, own)) => {
-                Subject { shape: own.shape.clone(), table: own.tissue.clone(), ..usual }
+                let hyperelastic = usual.hyperelastic || own.tissue.needs("hyperelastic");
+                Subject { shape: own.shape.clone(), table: own.tissue.clone(), hyperelastic }
             }
             None => usual,
         }

@@ -115,7 +115,7 @@ pub struct CampaignSpec {
     /// Dimensions of that finger, or the default's.
     #[serde(skip)]
     pub shape: FingertipShape,
-    /// Effects, as in a scene.
+    /// Effects, as in a scene: those of [`usual`] and what the tissues need, if the file names none.
     #[serde(default = "usual")]
     pub effects: Vec<EffectName>,
     /// Constants of tissues, as in a scene.
@@ -216,6 +216,9 @@ impl CampaignSpec {
         let found = Finger::find(name, &self.folder)?;
         if !has_key(text, "materials") {
             self.materials = found.tissue;
+        }
+        if !has_key(text, "effects") {
+            self.effects.extend(&self.materials.needs);
         }
         self.finger_sha256 = Some(sha256_of(&found.shape, &self.materials));
         self.shape = found.shape;

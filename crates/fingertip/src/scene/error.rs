@@ -65,6 +65,15 @@ pub enum SceneError {
         /// Why not, and the cure.
         why: String,
     },
+    /// An effect with which the tissues were fitted, and which the scene does not name.
+    #[error(
+        "effects: '{effect}' is missing. The constants of the tissues were fitted with it (`needs` in \
+         [materials], or in [tissue] of the finger): name it in effects, or take it out of `needs`"
+    )]
+    Unnamed {
+        /// The effect.
+        effect: &'static str,
+    },
     /// A material out of range.
     #[error(transparent)]
     Material(#[from] TissueError),
@@ -102,6 +111,7 @@ impl SceneError {
             Self::Value { field, .. } => Some(field.clone()),
             Self::Fields { field, .. } | Self::Pressure { field, .. } => Some((*field).into()),
             Self::Effect { effect, .. } => Some(format!("effects[{effect}]")),
+            Self::Unnamed { .. } => Some("effects".into()),
             Self::Material(e) => Some(material_field(e)),
             Self::Indenter(e) => Some(indenter_field(e)),
             Self::Shape(e) => Some(e.field()),

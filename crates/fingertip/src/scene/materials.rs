@@ -1,5 +1,6 @@
 //! The table `[materials]` of a scene: the constants of each tissue.
 
+use super::effects::EffectName;
 use crate::materials::{MaterialError, MaterialSpec, Moduli, OgdenSpec, PronySpec};
 use crate::tissue::Tissue;
 use papilla_solid::Isochoric as _;
@@ -13,6 +14,10 @@ pub struct TissueTable {
     /// Tension of the skin at rest, N/mm, in every direction along it; none if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin_tension_n_per_mm: Option<f64>,
+    /// Effects with which the constants were fitted. A scene has to name them: without them the
+    /// constants would mean another finger.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub needs: Vec<EffectName>,
     /// Epidermis.
     pub epidermis: MaterialSpec,
     /// Dermis.
@@ -46,6 +51,9 @@ struct Given {
     set: MaterialSet,
     /// Tension of the skin at rest, N/mm, in every direction along it; none if not given.
     skin_tension_n_per_mm: Option<f64>,
+    /// Effects with which the constants were fitted, and which a scene therefore has to name [those of
+    /// the set].
+    needs: Option<Vec<EffectName>>,
     /// Epidermis.
     epidermis: Option<MaterialSpec>,
     /// Dermis.
@@ -64,6 +72,7 @@ impl From<Given> for TissueTable {
         Self {
             // No tension is none: it costs nothing and changes no hash.
             skin_tension_n_per_mm: given.skin_tension_n_per_mm.filter(|t| *t != 0.0),
+            needs: given.needs.unwrap_or(set.needs),
             epidermis: given.epidermis.unwrap_or(set.epidermis),
             dermis: given.dermis.unwrap_or(set.dermis),
             subcutaneous: given.subcutaneous.unwrap_or(set.subcutaneous),
@@ -80,6 +89,7 @@ impl MaterialSet {
         let elastic = MaterialSpec::elastic;
         let papers = TissueTable {
             skin_tension_n_per_mm: None,
+            needs: Vec::new(),
             epidermis: elastic(0.136, 0.48),
             dermis: MaterialSpec {
                 ogden: Some(OgdenSpec::skin()),
@@ -98,7 +108,8 @@ impl MaterialSet {
             Self::Papers => papers,
             Self::People => {
                 let [epidermis, dermis, subcutaneous] = people();
-                TissueTable { epidermis, dermis, subcutaneous, ..papers }
+                let needs = EffectName::named("hyperelastic").into_iter().collect();
+                TissueTable { needs, epidermis, dermis, subcutaneous, ..papers }
             }
         }
     }
@@ -159,6 +170,12 @@ impl TissueTable {
             Tissue::Nail => &self.nail,
             Tissue::Bone => &self.bone,
         }
+    }
+
+    /// Whether the constants were fitted with the effect of this name.
+    #[must_use]
+    pub fn needs(&self, effect: &str) -> bool {
+        self.needs.iter().any(|e| e.as_str() == effect)
     }
 
     /// Checks every entry, used or not.

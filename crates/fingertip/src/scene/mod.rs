@@ -180,6 +180,9 @@ impl Scene {
             self.take_map(map_pa)?;
         }
         self.take_finger()?;
+        if !self.origin.has("effects") {
+            self.effects.extend(&self.materials.needs);
+        }
         self.take_meshes()?;
         self.validate()?;
         self.take_pressure()

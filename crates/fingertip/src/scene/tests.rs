@@ -38,6 +38,26 @@ fn a_set_gives_what_no_table_does() {
     assert_refused(&[(unknown, 8, &["pigs", "papers", "people"])]);
 }
 
+/// Constants that were fitted with an effect mean another finger without it.
+#[test]
+fn effects_with_which_tissues_were_fitted_are_taken_or_asked_for() {
+    let people = "[materials]\nset = \"people\"\n";
+    let names = |scene: &Scene| scene.effects.iter().map(EffectName::as_str).collect::<Vec<_>>();
+    let scene = parse(&format!("{FINGER}{people}")).unwrap();
+    assert_eq!(names(&scene), ["finite_strain", "layers", "hyperelastic"]);
+    assert_eq!(scene.plan().unwrap().law, effects::Law::Ogden);
+    // Whoever says that he wants the constants without it gets them.
+    let own = "effects = [\"finite_strain\", \"layers\"]\n";
+    let scene = parse(&format!("{own}{FINGER}{people}needs = []\n")).unwrap();
+    assert_eq!(scene.plan().unwrap().law, effects::Law::NeoHookean);
+    let needs = "[materials]\nneeds = [\"hyperelastic\"]\n";
+    assert_refused(&[
+        (format!("{own}{FINGER}{people}"), 1, &["'hyperelastic' is missing", "`needs`"]),
+        (format!("{own}{FINGER}{needs}"), 1, &["'hyperelastic' is missing"]),
+        (format!("{FINGER}[materials]\nneeds = [\"elastic\"]\n"), 8, &["unknown effect 'elastic'"]),
+    ]);
+}
+
 #[test]
 fn skin_is_slack_unless_a_scene_says_its_tension() {
     let with = |tension: &str| format!("{FINGER}[materials]\nskin_tension_n_per_mm = {tension}\n");

@@ -5,6 +5,7 @@ use super::laws::solids;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, blame, build, build_guide};
 use crate::mesh::grading::Contact;
+use crate::scene::effects::Law;
 use crate::scene::{Plan, TissueTable};
 use papilla_fem::mesh::Mesh;
 use papilla_fem::solve::{Materials, ProblemError};
@@ -84,7 +85,8 @@ impl Body {
         Self::even(&FingertipShape::default(), &TissueTable::default(), density)
     }
 
-    /// A finger on an even mesh with the surface-pressure study's analysis.
+    /// A finger on an even mesh with the surface-pressure study's analysis, but with Ogden's law where
+    /// its tissues were fitted with that.
     ///
     /// # Errors
     /// [`SimulationError`] if it cannot be set up.
@@ -93,7 +95,8 @@ impl Body {
         tissues: &TissueTable,
         density: Density,
     ) -> Result<Self, SimulationError> {
-        let plan = Plan::usual();
+        let law = if tissues.needs("hyperelastic") { Law::Ogden } else { Law::NeoHookean };
+        let plan = Plan { law, ..Plan::usual() };
         let materials = solids(tissues, &plan)?;
         Self::fingertip(shape, materials, density, Order::Linear, plan.parts, None)
     }

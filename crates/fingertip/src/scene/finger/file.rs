@@ -3,6 +3,7 @@
 use super::{FIELDS, Finger, SKIN_FILE};
 use crate::geometry::fingertip::{FingertipShape, LayerMap, SkinOffset, SurfaceParameter};
 use crate::materials::MaterialSpec;
+use crate::scene::effects::EffectName;
 use crate::scene::materials::{MaterialSet, TissueTable};
 use crate::tissue::Tissue;
 use serde::{Deserialize, Serialize};
@@ -239,12 +240,21 @@ fn tissue(table: &TissueTable) -> String {
         own.filter(|(t, spec)| *spec != usual.of(*t)).collect()
     };
     let (papers, people) = (differing(MaterialSet::Papers), differing(MaterialSet::People));
-    let (name, own) =
-        if people.len() < papers.len() { ("people", people) } else { ("papers", papers) };
+    let (name, own, needs) = match people.len() < papers.len() {
+        true => ("people", people, MaterialSet::People.table().needs),
+        false => ("papers", papers, MaterialSet::Papers.table().needs),
+    };
     let mut text = format!("[tissue]\nset = \"{name}\"\n");
     if let Some(tension) = table.skin_tension_n_per_mm {
         text +=
             &format!("# Tension of the skin at rest, N/mm.\nskin_tension_n_per_mm = {tension:?}\n");
+    }
+    if table.needs != needs {
+        let names: Vec<&str> = table.needs.iter().map(EffectName::as_str).collect();
+        text += &format!(
+            "# Effects with which these constants were fitted: whoever presses the finger has to name them.\n\
+             needs = {names:?}\n"
+        );
     }
     for (tissue, spec) in own {
         let inner = toml::Table::try_from(spec).unwrap_or_default();

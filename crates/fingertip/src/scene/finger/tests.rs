@@ -42,6 +42,13 @@ fn what_is_written_is_read_as_the_same() {
     let text = finger.to_toml();
     assert!(text.contains("set = \"people\""), "{text}");
     assert_eq!(parse(&text).unwrap(), finger);
+    // Of the constants it is said which effects they were fitted with, where the set does not say so.
+    let mut fitted = Finger::usual();
+    fitted.tissue.needs = MaterialSet::People.table().needs;
+    assert!(fitted.to_toml().contains("needs = [\"hyperelastic\"]"));
+    assert_eq!(parse(&fitted.to_toml()).unwrap(), fitted);
+    assert_ne!(fitted.sha256(), Finger::usual().sha256());
+    assert!(!Finger::usual().to_toml().contains("needs"));
     // Every number says its default and its range.
     assert_eq!(text.matches(", default ").count(), FIELDS.len());
 }

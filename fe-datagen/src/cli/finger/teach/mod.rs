@@ -23,6 +23,7 @@ use papilla_fingertip::mesh::fingertip::check_elements;
 use papilla_fingertip::scene::Finger;
 use papilla_output::atomic;
 use programs::Programs;
+use sequence::Sequence;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -115,7 +116,7 @@ fn teach(args: &Args, stop: std::sync::Arc<std::sync::atomic::AtomicBool>) -> an
     plan::require(args)?;
     let finger = Finger::read(folder)?;
     check_elements(&finger.shape)?;
-    let scale = sequence::Scale::of(&finger.shape)?;
+    let sequence = Sequence::of(args.campaign.as_deref(), &finger)?;
     let names = match args.networks.is_empty() {
         true => lender::usual(&args.from)?,
         false => args.networks.clone(),
@@ -131,7 +132,7 @@ fn teach(args: &Args, stop: std::sync::Arc<std::sync::atomic::AtomicBool>) -> an
     let needs_contact = !args.without_contact && !has_contact(args, &finger)?;
     // The campaign names the finger by the way from its own folder.
     atomic::create_folder(&args.path(""))?;
-    let plan = plan::plan(args, &programs, scale, &lenders, needs_contact)?;
+    let plan = plan::plan(args, &programs, &sequence, &lenders, needs_contact)?;
     atomic::write_changed(&args.campaign_path(), plan.text.as_bytes())?;
     let said = || plan.human(folder);
     if args.plan {

@@ -4,7 +4,7 @@ use super::Args;
 use super::error::TeachError;
 use super::lender::Lender;
 use super::programs::Programs;
-use super::sequence::{self, Scale};
+use super::sequence::Sequence;
 use papilla_campaign::{CampaignError, Status, StatusReader};
 use papilla_fingertip::campaign::{CampaignSpec, held_out, indentations};
 use papilla_output::atomic;
@@ -107,14 +107,13 @@ pub(super) fn require(args: &Args) -> Result<(), TeachError> {
 pub(super) fn plan(
     args: &Args,
     programs: &Programs,
-    scale: Scale,
+    sequence: &Sequence,
     lenders: &[Lender],
     needs_contact: bool,
 ) -> anyhow::Result<Plan> {
     let campaign = args.campaign_path();
-    let template = sequence::template(args.campaign.as_deref())?;
     let of = |presses: usize| -> anyhow::Result<(String, CampaignSpec)> {
-        let text = sequence::text(&template, scale, presses)?;
+        let text = sequence.text(presses)?;
         let spec = CampaignSpec::parse(&campaign, &text)?;
         Ok((text, spec))
     };

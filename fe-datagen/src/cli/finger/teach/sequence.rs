@@ -1,6 +1,6 @@
 //! The presses that a finger is taught with: a campaign in its folder.
 
-use papilla_fingertip::campaign::{CampaignSpec, DepthRange, SpecError};
+use papilla_fingertip::campaign::{CampaignSpec, DepthRange};
 use papilla_fingertip::geometry::fingertip::{
     FingertipShape, FingertipShapeError, SurfaceParameter,
 };
@@ -13,15 +13,15 @@ const SEQUENCE: &str = include_str!("../../../../../campaigns/teach.toml");
 
 /// How much larger a finger is than the default one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scale {
+struct Scale {
     /// Soft tissue below the middle of the pad.
-    pub pulp: f64,
+    pulp: f64,
     /// Width of the thickest section.
-    pub width: f64,
+    width: f64,
 }
 
 impl Scale {
-    pub(super) fn of(shape: &FingertipShape) -> Result<Self, FingertipShapeError> {
+    fn of(shape: &FingertipShape) -> Result<Self, FingertipShapeError> {
         let usual = Finger::usual().shape;
         let per_mille = |ratio: f64| (1e3 * ratio).round() / 1e3;
         Ok(Self {
@@ -37,54 +37,64 @@ fn pulp_mm(shape: &FingertipShape) -> Result<f64, FingertipShapeError> {
     Ok((100.0 * norm(minus(bounds[3], bounds[0]))).round() / 100.0)
 }
 
-/// The presses of another campaign, or of the sequence.
-pub(super) fn template(file: Option<&Path>) -> Result<CampaignSpec, SpecError> {
-    match file {
-        Some(file) => CampaignSpec::read(file),
-        None => CampaignSpec::parse(Path::new("campaigns/teach.toml"), SEQUENCE),
-    }
+/// What a finger is pressed with.
+#[derive(Debug)]
+pub(super) struct Sequence {
+    /// The presses, for the default finger, with the effects that the finger's tissues were fitted with.
+    template: CampaignSpec,
+    scale: Scale,
 }
 
-/// The text of the campaign in a finger's folder, `presses` long: depths in proportion to the pulp,
-/// offsets to the width. What lies in the finger's way has the size that it has.
-pub(super) fn text(
-    template: &CampaignSpec,
-    scale: Scale,
-    presses: usize,
-) -> Result<String, toml::ser::Error> {
-    let mut spec = template.clone();
-    spec.presses = presses;
-    spec.finger = Some(PathBuf::from(".."));
-    spec.finger_sha256 = None;
-    let hundredths = |mm: f64, by: f64| (100.0 * mm * by).round() / 100.0;
-    let depths = |range: &mut Option<DepthRange>| {
-        if let Some(range) = range {
-            range.deepest_mm = range.deepest_mm.map(|mm| hundredths(mm, scale.pulp));
-        }
-    };
-    let offsets = |ranges: &mut [[f64; 2]; 2]| {
-        *ranges = ranges.map(|r| r.map(|mm| hundredths(mm, scale.width)));
-    };
-    depths(&mut spec.depths);
-    spec.depths_mm.iter_mut().for_each(|mm| *mm = hundredths(*mm, scale.pulp));
-    offsets(&mut spec.offset_mm);
-    for candidate in &mut spec.indenters {
-        depths(&mut candidate.depths);
-        candidate.offset_mm.as_mut().map(offsets);
+impl Sequence {
+    /// The presses of another campaign, or of `campaigns/teach.toml`, for a finger.
+    pub(super) fn of(file: Option<&Path>, finger: &Finger) -> anyhow::Result<Self> {
+        let mut template = match file {
+            Some(file) => CampaignSpec::read(file),
+            None => CampaignSpec::parse(Path::new("campaigns/teach.toml"), SEQUENCE),
+        }?;
+        let named = template.effects.clone();
+        template.effects.extend(finger.tissue.needs.iter().filter(|e| !named.contains(e)));
+        Ok(Self { template, scale: Scale::of(&finger.shape)? })
     }
-    let head = "# Written by `fe-datagen finger teach`: its presses for the finger in the folder above.\n\
-                # More presses may be asked for later; those that are solved are kept.\n\n";
-    Ok(head.to_owned() + &toml::to_string(&spec)?)
+
+    /// The text of the campaign in a finger's folder, `presses` long: depths in proportion to the pulp,
+    /// offsets to the width. What lies in the finger's way has the size that it has.
+    pub(super) fn text(&self, presses: usize) -> Result<String, toml::ser::Error> {
+        let mut spec = self.template.clone();
+        spec.presses = presses;
+        spec.finger = Some(PathBuf::from(".."));
+        spec.finger_sha256 = None;
+        let hundredths = |mm: f64, by: f64| (100.0 * mm * by).round() / 100.0;
+        let depths = |range: &mut Option<DepthRange>| {
+            if let Some(range) = range {
+                range.deepest_mm = range.deepest_mm.map(|mm| hundredths(mm, self.scale.pulp));
+            }
+        };
+        let offsets = |ranges: &mut [[f64; 2]; 2]| {
+            *ranges = ranges.map(|r| r.map(|mm| hundredths(mm, self.scale.width)));
+        };
+        depths(&mut spec.depths);
+        spec.depths_mm.iter_mut().for_each(|mm| *mm = hundredths(*mm, self.scale.pulp));
+        offsets(&mut spec.offset_mm);
+        for candidate in &mut spec.indenters {
+            depths(&mut candidate.depths);
+            candidate.offset_mm.as_mut().map(offsets);
+        }
+        let head = "# Written by `fe-datagen finger teach`: its presses for the finger in the folder above.\n\
+                    # More presses may be asked for later; those that are solved are kept.\n\n";
+        Ok(head.to_owned() + &toml::to_string(&spec)?)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use papilla_fingertip::campaign::{held_out, indentations};
+    use papilla_fingertip::scene::MaterialSet;
     use std::collections::BTreeMap;
 
     fn usual() -> CampaignSpec {
-        template(None).unwrap()
+        Sequence::of(None, &Finger::usual()).unwrap().template
     }
 
     fn campaigns() -> Vec<CampaignSpec> {
@@ -152,17 +162,32 @@ mod tests {
         let finger = Finger::usual().to_toml().replace("width_mm = 17.44", "width_mm = 13.08");
         std::fs::write(folder.path().join("finger.toml"), finger).unwrap();
         let path = folder.path().join("teach/campaign.toml");
-        let shape = Finger::read(folder.path()).unwrap().shape;
-        let scale = Scale { pulp: 0.5, ..Scale::of(&shape).unwrap() };
-        assert!((scale.width - 0.75).abs() < 1e-9);
-        let read = CampaignSpec::parse(&path, &text(&usual(), scale, 20).unwrap()).unwrap();
+        let finger = Finger::read(folder.path()).unwrap();
+        let mut sequence = Sequence::of(None, &finger).unwrap();
+        assert!((sequence.scale.width - 0.75).abs() < 1e-9);
+        sequence.scale.pulp = 0.5;
+        let read = CampaignSpec::parse(&path, &sequence.text(20).unwrap()).unwrap();
         assert_eq!((read.presses, read.test_one_in), (20, Some(5)));
-        assert_eq!(read.shape, shape);
+        assert_eq!(read.shape, finger.shape);
         for (own, usual) in indentations(&read).iter().zip(indentations(&usual())) {
             assert_eq!((own.pose, &own.indenter), (usual.pose, &usual.indenter));
             let about = |a: f64, b: f64| (a - b).abs() < 0.011;
             assert!(about(own.deepest_mm(), 0.5 * usual.deepest_mm()));
             assert!((0..2).all(|i| about(own.offset_mm[i], 0.75 * usual.offset_mm[i])));
         }
+    }
+
+    #[test]
+    fn a_finger_is_pressed_with_the_effects_that_its_tissues_were_fitted_with() {
+        let people = Finger { tissue: MaterialSet::People.table(), ..Finger::usual() };
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("teach")).unwrap();
+        std::fs::write(folder.path().join("finger.toml"), people.to_toml()).unwrap();
+        let text = Sequence::of(None, &people).unwrap().text(5).unwrap();
+        let read = CampaignSpec::parse(&folder.path().join("teach/campaign.toml"), &text).unwrap();
+        let names: Vec<&str> = read.effects.iter().map(|e| e.as_str()).collect();
+        assert_eq!(names, ["finite_strain", "layers", "hyperelastic"]);
+        let usual = usual().effects;
+        assert_eq!(usual.len(), 2, "those of the default finger are as they were");
     }
 }
