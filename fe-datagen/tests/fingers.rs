@@ -165,6 +165,21 @@ fn an_atlas_is_built_of_the_finger_and_is_the_default_one_for_the_default_finger
     assert_ne!(build("wide"), hash(&models));
 }
 
+/// Such a finger has no contact on pixels, which the networks for poses learn from: said before hours of
+/// presses, not after.
+#[test]
+fn teaching_poses_to_skin_under_tension_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mine = folder.path().join("mine");
+    std::fs::create_dir(&mine).unwrap();
+    let text = "[tissue]\nskin_tension_n_per_mm = 0.01\n";
+    std::fs::write(mine.join("finger.toml"), text).unwrap();
+    let error = refused(folder.path(), &["finger", "teach", "mine", "--presses", "5"]);
+    assert!(error.contains("skin_tension_n_per_mm"), "{error}");
+    assert!(error.contains("--without-contact --network small-maps"), "{error}");
+    assert!(!mine.join("teach").exists());
+}
+
 #[test]
 fn a_scan_that_is_refused_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();

@@ -56,7 +56,7 @@ impl ContactMaps {
         let pixels = pixel_contact(models, dataset, PixelSpacing::One);
         let (Some(mut solver), Some(mut pixels)) = (models.solver(Rung::Pixels), pixels) else {
             let reason = "the contact model has no layers, or other vertices than this atlas; \
-                write it anew with `fe-datagen contact`";
+                write it anew with `fe-datagen contact` (skin under tension has no layers)";
             let path = dataset.folder().join("atlas.json");
             return Err(ExportError::DatasetFile { path, reason: reason.to_owned() });
         };

@@ -84,7 +84,7 @@ impl<'a> Labeller<'a> {
         let skin = PixelSkin::new(&models.finger, atlas, raster);
         let (Some(skin), Some(solver)) = (skin, models.solver(Rung::Pixels)) else {
             let reason = "the contact model has no layers, so it knows no pixels; write it anew \
-                with `fe-datagen contact`";
+                with `fe-datagen contact` (skin under tension has no layers)";
             let path = atlas_path.to_owned();
             return Err(ExportError::DatasetFile { path, reason: reason.to_owned() });
         };

@@ -71,7 +71,10 @@ pub struct Chart {
 const SIZE_PX: (u32, u32) = (880, 560);
 /// Height of the names of dots, px.
 const TEXT_PX: i32 = 14;
-/// Colours of the series, in their order.
+/// Dashes and the gaps between them, px.
+const DASH_PX: i32 = 8;
+const GAP_PX: i32 = 5;
+/// Colours of the series, in their order; further series have them again, with dashed lines.
 const COLOURS: [RGBColor; 8] = [
     palette::BLUE,
     palette::VERMILION,
@@ -165,10 +168,20 @@ fn draw_on(area: &Area<'_>, chart: &Chart, x: Scale, y: Scale) -> Drawn {
             }
             continue;
         }
-        context
-            .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
-            .label(&series.name)
-            .legend(move |(x, y)| Rectangle::new([(x, y - 4), (x + 16, y + 4)], colour.filled()));
+        let style = colour.stroke_width(2);
+        // Colours that come again are told by dashes.
+        if i < COLOURS.len() {
+            let box_of =
+                move |(x, y)| Rectangle::new([(x, y - 4), (x + 16, y + 4)], colour.filled());
+            context.draw_series(LineSeries::new(points, style))?.label(&series.name).legend(box_of);
+        } else {
+            let part = move |from| Rectangle::new([(from, -4), (from + 6, 4)], colour.filled());
+            let line = DashedLineSeries::new(points, DASH_PX, GAP_PX, style);
+            context
+                .draw_series(line)?
+                .label(&series.name)
+                .legend(move |at| EmptyElement::at(at) + part(0) + part(10));
+        }
     }
     if chart.series.iter().all(|s| s.mark == Mark::Dots) {
         return Ok(());

@@ -42,6 +42,19 @@ pub(super) enum TeachError {
         /// Hours of these.
         needed: f64,
     },
+    /// Skin under tension has no contact that networks for poses could learn from.
+    #[error(
+        "{}: its skin is under tension (skin_tension_n_per_mm), and then there is no contact on pixels, \
+         which networks for poses learn from; add --without-contact --network {network} for a network \
+         for pressure, or leave the tension out",
+        folder.display()
+    )]
+    Tension {
+        /// The finger.
+        folder: PathBuf,
+        /// A network that learns from FE's pressure.
+        network: &'static str,
+    },
     /// The presses there are of something else.
     #[error(
         "{}: these presses were begun for other dimensions or tissues of the finger, another campaign \

@@ -116,6 +116,9 @@ fn teach(args: &Args, stop: std::sync::Arc<std::sync::atomic::AtomicBool>) -> an
     plan::require(args)?;
     let finger = Finger::read(folder)?;
     check_elements(&finger.shape)?;
+    if finger.tissue.skin_tension_n_per_mm.is_some() && !args.without_contact {
+        return Err(TeachError::Tension { folder: folder.clone(), network: "small-maps" }.into());
+    }
     let sequence = Sequence::of(args.campaign.as_deref(), &finger)?;
     let names = match args.networks.is_empty() {
         true => lender::usual(&args.from)?,
