@@ -58,7 +58,7 @@ def test_touch_is_that_of_a_session_to_the_bit(base, terms, net):
     assert max(rounds) > 0 and contact.force_n[2] > 0.02
 
 
-def test_what_presses_near_the_joint_is_unfamiliar():
+def test_what_presses_near_the_joint_at_the_tip_or_at_a_side_is_unfamiliar():
     """No simulation with its centre there has checked the networks: narrow objects make them err by a third."""
     ball = {"shape": {"shape": "sphere", "radius_mm": 3.0}}
 
@@ -74,8 +74,10 @@ def test_what_presses_near_the_joint_is_unfamiliar():
         assert pressed(session, 19.5).unfamiliar
     with papilla.local() as session:
         rows, columns = np.mgrid[:224, :224]
-        for row, unfamiliar in ((110, False), (170, True)):
-            disc = (rows - row) ** 2 + (columns - 112) ** 2 < 12.0**2
+        # The middle of the pad; near the joint, at the tip, and at both sides.
+        places = ((110, 112, False), (170, 112, True), (35, 112, True), (110, 45, True), (110, 179, True))
+        for row, column, unfamiliar in places:
+            disc = (rows - row) ** 2 + (columns - column) ** 2 < 12.0**2
             assert session.render(np.where(disc, 1.5e4, 0.0).astype(np.float32)).unfamiliar == unfamiliar
 
 
