@@ -47,7 +47,8 @@ fn a_record_that_was_simulated_is_fitted_again() {
         moved: Moved::named(&[]),
         design: 20,
         rounds: 8,
-        graded: 0,
+        finer: 0,
+        finer_mesh: FinerMesh::Medium,
         only: vec!["constants".into()],
     };
     let records = vec![("made.csv".to_owned(), presses)];
