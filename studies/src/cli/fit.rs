@@ -3,7 +3,7 @@
 use super::people::OfPeople;
 use papilla_fe_datagen::cli::{print, refuse_unknown};
 use papilla_studies::people::fit::parameters::{Moved, PARAMETERS};
-use papilla_studies::people::fit::{self, FinerMesh, Options, PARTS, record};
+use papilla_studies::people::fit::{self, Options, PARTS, record};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -38,13 +38,10 @@ pub(super) struct Args {
     /// Fingers simulated after it at most.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u16).range(0..=1000))]
     rounds: u16,
-    /// Fingers simulated on the finer mesh at most, each ten times as long or more; 0 leaves the even coarse
-    /// mesh uncorrected.
+    /// Fingers simulated on the graded mesh at most, each some ten times as long; 0 leaves the even mesh
+    /// uncorrected.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u16).range(0..=100))]
-    finer: u16,
-    /// The finer mesh.
-    #[arg(long, value_enum, default_value_t = FinerMesh::Medium)]
-    finer_mesh: FinerMesh,
+    graded: u16,
     #[command(flatten)]
     people: OfPeople,
 }
@@ -60,11 +57,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         moved: Moved::named(&args.moved),
         design: args.design.into(),
         rounds: args.rounds.into(),
-        finer: args.finer.into(),
-        finer_mesh: args.finer_mesh,
+        graded: args.graded.into(),
         only: args.only.clone(),
     };
-    let all = options.design + options.rounds + options.finer;
+    let all = options.design + options.rounds + options.graded;
     let fit = people
         .told("fingers", all, |told| fit::run(&measured, records, &options, &people.out, told))?;
     if let Some(page) = &people.markdown {

@@ -114,9 +114,6 @@ impl Cells {
 
     /// Even, Hex8: a tenth of the time.
     pub(crate) const COARSE: Self = Self { density: Density::Coarse, order: Order::Linear };
-
-    /// Even, Hex8, half the spacing.
-    pub(crate) const MEDIUM: Self = Self { density: Density::Medium, order: Order::Linear };
 }
 
 impl Press {

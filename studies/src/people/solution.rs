@@ -228,11 +228,15 @@ const LIMIT_SPLIT_MM: f64 = 4.25;
 /// Deepest on an even one: a finger of Hertz' modulus .2 MPa has 10 N at 4.3 mm, one of .15 MPa at
 /// 5.2 mm.
 const LIMIT_EVEN_MM: f64 = 5.25;
+/// How much deeper a press on a split mesh goes if the depth at which the even one had the force is not
+/// enough.
+const BEYOND_EVEN: f64 = 1.25;
 /// How much deeper than Hertz' guess a press may go at first.
 const BEYOND_GUESS: f64 = 1.25;
 
-/// A press until a force is met. Cells are split for all that may be touched, so the first try
-/// goes no deeper than Hertz' law for a soft finger, and each further one twice as deep.
+/// A press until a force is met. The first try goes no deeper than Hertz' law for a soft finger, and each
+/// further one twice as deep. Cells are split for all that may be touched: there the even mesh says how
+/// deep that is, since a mesh that is split for thrice the depth is pressed thrice as long.
 pub(crate) fn until(
     press: &Press,
     until_n: f64,
@@ -240,15 +244,23 @@ pub(crate) fn until(
     reads: Reads,
     folder: &Path,
 ) -> Result<Solution, PeopleError> {
-    let deepest_mm = if cells.order == Order::Graded { LIMIT_SPLIT_MM } else { LIMIT_EVEN_MM };
+    let is_split = cells.order == Order::Graded;
+    let deepest_mm = if is_split { LIMIT_SPLIT_MM } else { LIMIT_EVEN_MM };
     let mut limit_mm = (BEYOND_GUESS * press.hertz_depth_mm(until_n)?).min(deepest_mm);
+    if is_split {
+        let way = until(press, until_n, Cells::COARSE, reads, folder)?;
+        if way.path.reaches(until_n) {
+            limit_mm = way.path.deepest().1.min(deepest_mm);
+        }
+    }
     loop {
         let course = Course::until(until_n, cells, reads, limit_mm);
         let found = Solution::found_or_solved(press, &course, folder)?;
         if found.path.reaches(until_n) || found.ended.is_some() || limit_mm >= deepest_mm {
             return Ok(found);
         }
-        limit_mm = (2.0 * limit_mm).min(deepest_mm);
+        let further = if is_split { BEYOND_EVEN } else { 2.0 };
+        limit_mm = (further * limit_mm).min(deepest_mm);
     }
 }
 

@@ -1,13 +1,13 @@
 //! Every published row with the fitted finger.
 
-use super::FinerMesh;
 use super::shares::{Shares, asked, found, relaxing, series};
 use crate::people::PeopleError;
 use crate::people::measured::{Figure, Measured, Quantity};
 use crate::people::pad;
-use crate::people::press::Subject;
+use crate::people::press::{Cells, Subject};
 use crate::people::report::{Row, Verdict};
 use crate::people::study::{plates, row};
+use papilla_fingertip::mesh::fingertip::Density;
 use std::path::Path;
 
 /// How far a single figure may be missed, as a share of it.
@@ -26,19 +26,19 @@ pub(crate) fn relaxation(
     Ok(Some(shares))
 }
 
-/// Rows of plates and taps, plates on the finer mesh; `taps` says whether the tissues' relaxation is
+/// Rows of plates and taps, plates on the graded mesh; `taps` says whether the tissues' relaxation is
 /// fitted.
 pub(crate) fn rows(
     measured: &Measured,
     subject: &Subject,
-    (taps, mesh): (bool, FinerMesh),
+    taps: bool,
     folder: &Path,
     told: &mut dyn FnMut(&str),
 ) -> Result<Vec<Row>, PeopleError> {
-    let cells = mesh.cells();
+    let cells = Cells::graded(Density::Coarse);
     let mut presses = Vec::new();
     for (pitch_deg, until_n) in plates(measured) {
-        told("plates on the finer mesh");
+        told("plates on the graded mesh");
         let found = pad::pressed(pitch_deg, until_n, subject.clone(), cells, folder)?;
         presses.push((pitch_deg, found));
     }

@@ -1,7 +1,7 @@
 //! The finger that comes closest to people's, or to a person's own records.
 //!
 //! Presses settle constants of tissues and of shape between bounds, each row weighted by its spread.
-//! What the even coarse mesh says is interpolated ([`adapt`]) and corrected by what a finer mesh
+//! What the even coarse mesh says is interpolated ([`adapt`]) and corrected by what the graded mesh
 //! says at the best point. [`profile`] says which constants the rows tell, [`halves`] what one half of
 //! the rows predicts of the other. Then the energy lost in a tap settles how the tissues relax. Every
 //! press is stored, and a run that was killed goes on where it stopped.
@@ -24,12 +24,10 @@ pub use shares::{Shares, Tapped};
 
 use crate::people::PeopleError;
 use crate::people::measured::Measured;
-use crate::people::press::Cells;
 use crate::people::report::Row;
 use adapt::{Evaluated, Landscape, Optimum, best, design, own, plus, refine};
 use halves::Half;
 use objective::Data;
-use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::scene::Finger;
 use papilla_fingertip::scene::finger::Source;
 use papilla_output::atomic;
@@ -66,8 +64,8 @@ pub struct Fitted {
     pub start: f64,
     /// With those of the end, on the even mesh.
     pub even: f64,
-    /// The same on the finer mesh; absent if it was not asked for.
-    pub finer: Option<f64>,
+    /// The same on the graded mesh; absent if it was not asked for.
+    pub graded: Option<f64>,
     /// Weighted residual at the end.
     pub residual: f64,
     /// What the surrogate misses at points that it does not know, %; of a record the mean over the
@@ -96,47 +94,19 @@ pub struct Fit {
     pub rows: Vec<Fitted>,
     /// Every point that was simulated on the even mesh.
     pub evaluated: Vec<Evaluated>,
-    /// Points that were simulated on the finer mesh.
-    pub finer: usize,
-    /// Which mesh that is.
-    pub finer_mesh: FinerMesh,
+    /// Points that were simulated on the graded mesh.
+    pub graded: usize,
     /// Each half of the rows, fitted alone.
     pub halves: Vec<Half>,
     /// Relaxation, if published measurements have a tap and times.
     pub shares: Option<Shares>,
-    /// Every published row with the fitted finger, plates on the finer mesh.
+    /// Every published row with the fitted finger, plates on the graded mesh.
     pub judged: Vec<Row>,
-    /// Processor time of all presses on the even coarse and on the finer mesh, s.
+    /// Processor time of all presses on the even and on the graded mesh, s.
     pub solve_s: [f64; 2],
     /// The finger, as its file has it.
     #[serde(skip)]
     pub finger: Finger,
-}
-
-/// The mesh that corrects what the even coarse one says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
-#[serde(rename_all = "snake_case")]
-pub enum FinerMesh {
-    /// The even medium mesh.
-    Medium,
-    /// The coarse mesh whose cells are split where they touch, with quadratic displacement.
-    Graded,
-}
-
-impl FinerMesh {
-    fn cells(self) -> Cells {
-        match self {
-            Self::Medium => Cells::MEDIUM,
-            Self::Graded => Cells::graded(Density::Coarse),
-        }
-    }
-
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Medium => "even medium mesh",
-            Self::Graded => "graded coarse mesh",
-        }
-    }
 }
 
 /// What is fitted to, and how far.
@@ -148,10 +118,8 @@ pub struct Options {
     pub design: usize,
     /// Points simulated after it at most.
     pub rounds: usize,
-    /// Points simulated on the finer mesh at most; 0 leaves the even coarse mesh uncorrected.
-    pub finer: usize,
-    /// The mesh that corrects the even coarse one.
-    pub finer_mesh: FinerMesh,
+    /// Points simulated on the graded mesh at most; 0 leaves the even mesh uncorrected.
+    pub graded: usize,
     /// Some of [`PARTS`]; empty is all.
     pub only: Vec<String>,
 }
@@ -180,16 +148,16 @@ pub fn run(
         true => Data::published(measured),
         false => Data::recorded(presses.into_iter().flatten().collect()),
     };
-    let all = options.design + options.rounds + options.finer;
+    let all = options.design + options.rounds + options.graded;
     let moved = &options.moved;
     let parameters = moved.parameters();
-    let mut simulated = Simulated::new((&data, options), folder, told, all);
+    let mut simulated = Simulated::new((&data, moved), folder, told, all);
     let extras = start(data.extras());
     let every: Vec<usize> = (0..data.targets.len()).collect();
     let mut evaluated =
         design(&start(&parameters), options.design, &mut |at: &[f64]| simulated.even(at))?;
     let first = evaluated[0].clone();
-    let (optimum, correction, finer) =
+    let (optimum, correction, graded) =
         corrected(&data, &mut simulated, &mut evaluated, options, (&every, &extras))?;
     let halves = match wanted("halves") {
         true => halves::new(&data, &mut simulated, &mut evaluated, &correction, &extras)?,
@@ -198,7 +166,7 @@ pub fn run(
     let residuals = |f: &[f64], e: &[f64]| data.residuals(&every, &plus(f, &correction), e);
     let landscape = Landscape::new(&evaluated, &residuals, &extras);
     let constants = constants(&landscape, [&parameters, data.extras()], &optimum);
-    let rows = rows(&data, (&evaluated, &first), &optimum, (&correction, finer > 0));
+    let rows = rows(&data, (&evaluated, &first), &optimum, (&correction, graded > 0));
     let cost = [own(&first, &residuals, &extras).cost, optimum.cost];
     let solve_s = simulated.solve_s;
     let mut subject = simulated::subject(moved, &optimum.at);
@@ -209,13 +177,7 @@ pub fn run(
             shares = judged::relaxation(measured, &mut subject, folder, told)?;
         }
         if wanted("rows") {
-            judged = judged::rows(
-                measured,
-                &subject,
-                (shares.is_some(), options.finer_mesh),
-                folder,
-                told,
-            )?;
+            judged = judged::rows(measured, &subject, shares.is_some(), folder, told)?;
         }
     } else {
         let over_stays = values(data.extras(), &optimum.extras);
@@ -236,8 +198,7 @@ pub fn run(
         cost,
         rows,
         evaluated,
-        finer,
-        finer_mesh: options.finer_mesh,
+        graded,
         halves,
         shares,
         judged,
@@ -249,8 +210,8 @@ pub fn run(
     Ok(fit)
 }
 
-/// The best point of the even mesh, corrected by what the finer mesh says of it as long as that moves
-/// it: of the points that the finer mesh has seen the one that it finds best, the correction of each
+/// The best point of the even mesh, corrected by what the graded mesh says of it as long as that moves
+/// it: of the points that the graded mesh has seen the one that it finds best, the correction of each
 /// feature there, and how many points it has seen.
 fn corrected(
     data: &Data,
@@ -260,33 +221,33 @@ fn corrected(
     (every, extras): (&[usize], &[f64]),
 ) -> Result<(Optimum, Vec<f64>, usize), PeopleError> {
     let mut correction = vec![0.0; data.feature_count()];
-    let mut finer = 0;
+    let mut graded = 0;
     let mut least: Option<(Optimum, Vec<f64>)> = None;
     loop {
         let residuals = |f: &[f64], e: &[f64]| data.residuals(every, &plus(f, &correction), e);
-        let rounds = if finer == 0 { options.rounds } else { options.rounds.div_ceil(3) };
+        let rounds = if graded == 0 { options.rounds } else { options.rounds.div_ceil(3) };
         let even = &mut |at: &[f64]| simulated.even(at);
         let found = refine(evaluated, &residuals, extras, rounds, even)?;
-        if finer >= options.finer || !found.cost.is_finite() {
+        if graded >= options.graded || !found.cost.is_finite() {
             let (found, correction) = least.unwrap_or((found, correction));
-            return Ok((found, correction, finer));
+            return Ok((found, correction, graded));
         }
-        let fine = simulated.finer(&found.at)?;
-        finer += 1;
+        let fine = simulated.graded(&found.at)?;
+        graded += 1;
         let Some(coarse) = evaluated.iter().find(|e| e.at == found.at) else {
-            return Ok((found, correction, finer));
+            return Ok((found, correction, graded));
         };
         let differs = |(f, c): (&f64, &f64)| if (f - c).is_finite() { f - c } else { 0.0 };
         correction = fine.iter().zip(&coarse.features).map(differs).collect();
         let residuals = |f: &[f64], e: &[f64]| data.residuals(every, &plus(f, &correction), e);
         let here = own(coarse, &residuals, extras);
-        // What was simulated on the finer mesh is judged by that alone.
+        // What was simulated on the graded mesh is judged by that alone.
         if least.as_ref().is_none_or(|(least, _)| here.cost < least.cost) {
             least = Some((here, correction.clone()));
         }
         let stays = best(evaluated, &residuals, extras).at == found.at;
-        if let Some((found, correction)) = least.take_if(|_| finer == options.finer || stays) {
-            return Ok((found, correction, finer));
+        if let Some((found, correction)) = least.take_if(|_| graded == options.graded || stays) {
+            return Ok((found, correction, graded));
         }
     }
 }
@@ -311,7 +272,7 @@ fn rows(
     data: &Data,
     (evaluated, first): (&[Evaluated], &Evaluated),
     optimum: &Optimum,
-    (correction, is_corrected): (&[f64], bool),
+    (correction, graded): (&[f64], bool),
 ) -> Vec<Fitted> {
     let points: Vec<Vec<f64>> = evaluated.iter().map(|e| e.at.clone()).collect();
     let features: Vec<Vec<f64>> = evaluated.iter().map(|e| e.features.clone()).collect();
@@ -326,7 +287,7 @@ fn rows(
         people: t.people.clone(),
         start: begun[k],
         even: even[k],
-        finer: is_corrected.then(|| fine[k]),
+        graded: graded.then(|| fine[k]),
         residual: t.residual(fine[k]),
         surrogate_percent: 100.0 * data.missed(&missed, k),
         met: t.met(fine[k]),

@@ -108,16 +108,15 @@ impl Fit {
             let held: Vec<String> = self.held.iter().map(held).collect();
             let _ = write!(text, "\nNot moved: {}.\n", held.join("; "));
         }
-        let finer_mesh = self.finer_mesh.name();
-        let finer = match self.finer {
-            0 => "none on a finer mesh".to_owned(),
-            count => format!("{count} on the {finer_mesh} in {:.0} s", self.solve_s[1]),
+        let graded = match self.graded {
+            0 => "none on the graded mesh".to_owned(),
+            count => format!("{count} on the graded mesh in {:.0} s", self.solve_s[1]),
         };
         let _ = write!(
             text,
             "\n![How far each constant can be moved]({PICTURES}/profiles.svg)\n\nHalf the sum of the \
-             squared residuals falls from {:.3} to {:.3}. {} fingers were simulated on the even \
-             coarse mesh in {:.0} s of processor time, and {finer}.\n",
+             squared residuals falls from {:.3} to {:.3}. {} fingers were simulated on the even mesh in \
+             {:.0} s of processor time, and {graded}.\n",
             self.cost[0],
             self.cost[1],
             self.evaluated.len(),
@@ -127,7 +126,7 @@ impl Fit {
 
     fn fitted(&self, text: &mut String) {
         text.push_str(
-            "\n## Rows\n\n| quantity | people | at the start, coarse mesh | fitted, coarse mesh | fitted, finer mesh | weighted residual | within the range? | what the interpolation misses, % |\n|---|---|---|---|---|---|---|---|\n",
+            "\n## Rows\n\n| quantity | people | at the start, even mesh | fitted, even mesh | fitted, graded mesh | weighted residual | within the range? | what the interpolation misses, % |\n|---|---|---|---|---|---|---|---|\n",
         );
         for r in &self.rows {
             let [start, even] = [r.start, r.even].map(digits);
@@ -136,7 +135,7 @@ impl Fit {
                 "| {} | {} | {start} | {even} | {} | {:.2} | {} | {:.1} |",
                 r.name,
                 r.people,
-                r.finer.map_or_else(String::new, digits),
+                r.graded.map_or_else(String::new, digits),
                 r.residual,
                 yes(r.met),
                 r.surrogate_percent
@@ -234,8 +233,8 @@ impl Fit {
         text.extend(self.constants.iter().map(line));
         let _ = writeln!(text, "\n{:64} {:>12} {:>8} {:>8}", "row", "people", "start", "end");
         for r in &self.rows {
-            let Fitted { name, people, start, even, finer, .. } = r;
-            let [start, end] = [*start, finer.unwrap_or(*even)].map(digits);
+            let Fitted { name, people, start, even, graded, .. } = r;
+            let [start, end] = [*start, graded.unwrap_or(*even)].map(digits);
             let _ = writeln!(text, "{name:64} {people:>12} {start:>8} {end:>8}");
         }
         let _ = writeln!(text, "\ncost {:.3} -> {:.3}", self.cost[0], self.cost[1]);

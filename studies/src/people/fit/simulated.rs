@@ -2,9 +2,9 @@
 
 use super::objective::Data;
 use super::parameters::{Moved, shape, table};
-use super::{FinerMesh, Options};
 use crate::people::PeopleError;
 use crate::people::press::{Cells, Subject};
+use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::scene::{EffectName, Finger, TissueTable};
 use std::path::Path;
 
@@ -13,12 +13,11 @@ pub(crate) struct Simulated<'a> {
     data: &'a Data,
     /// The constants that points are of.
     pub moved: &'a Moved,
-    finer_mesh: FinerMesh,
     folder: &'a Path,
     told: &'a mut dyn FnMut(&str, usize, usize),
     done: usize,
     all: usize,
-    /// Processor time on the even coarse and on the finer mesh, s.
+    /// Processor time on the even and on the graded mesh, s.
     pub solve_s: [f64; 2],
 }
 
@@ -38,14 +37,12 @@ pub(crate) fn finger(subject: &Subject) -> Finger {
 
 impl<'a> Simulated<'a> {
     pub(crate) fn new(
-        (data, options): (&'a Data, &'a Options),
+        (data, moved): (&'a Data, &'a Moved),
         folder: &'a Path,
         told: &'a mut dyn FnMut(&str, usize, usize),
         all: usize,
     ) -> Self {
-        let Options { moved, finer_mesh, .. } = options;
-        let finer_mesh = *finer_mesh;
-        Self { data, moved, finer_mesh, folder, told, done: 0, all, solve_s: [0.0; 2] }
+        Self { data, moved, folder, told, done: 0, all, solve_s: [0.0; 2] }
     }
 
     /// Features on the even coarse mesh.
@@ -53,14 +50,14 @@ impl<'a> Simulated<'a> {
         self.features(at, Cells::COARSE, 0)
     }
 
-    /// Features on the finer mesh.
-    pub(crate) fn finer(&mut self, at: &[f64]) -> Result<Vec<f64>, PeopleError> {
-        self.features(at, self.finer_mesh.cells(), 1)
+    /// Features on the coarse mesh whose cells are split where they touch.
+    pub(crate) fn graded(&mut self, at: &[f64]) -> Result<Vec<f64>, PeopleError> {
+        self.features(at, Cells::graded(Density::Coarse), 1)
     }
 
     /// Not numbers of a finger that cannot be meshed or pressed at all.
     fn features(&mut self, at: &[f64], cells: Cells, mesh: usize) -> Result<Vec<f64>, PeopleError> {
-        let what = ["presses", "presses on the finer mesh"][mesh];
+        let what = ["presses", "presses on the graded mesh"][mesh];
         (self.told)(what, self.done.min(self.all), self.all);
         self.done += 1;
         let subject = subject(self.moved, at);

@@ -47,8 +47,7 @@ fn a_record_that_was_simulated_is_fitted_again() {
         moved: Moved::named(&[]),
         design: 20,
         rounds: 8,
-        finer: 0,
-        finer_mesh: FinerMesh::Medium,
+        graded: 0,
         only: vec!["constants".into()],
     };
     let records = vec![("made.csv".to_owned(), presses)];
