@@ -228,9 +228,9 @@ const LIMIT_SPLIT_MM: f64 = 4.25;
 /// Deepest on an even one: a finger of Hertz' modulus .2 MPa has 10 N at 4.3 mm, one of .15 MPa at
 /// 5.2 mm.
 const LIMIT_EVEN_MM: f64 = 5.25;
-/// How much deeper a press on a split mesh goes if the depth at which the even one had the force is not
-/// enough.
-const BEYOND_EVEN: f64 = 1.25;
+/// How much deeper than the even mesh says a press on a split one may go, and how much deeper again if
+/// that is not enough.
+const BEYOND_EVEN: f64 = 1.15;
 /// How much deeper than Hertz' guess a press may go at first.
 const BEYOND_GUESS: f64 = 1.25;
 
@@ -250,7 +250,7 @@ pub(crate) fn until(
     if is_split {
         let way = until(press, until_n, Cells::COARSE, reads, folder)?;
         if way.path.reaches(until_n) {
-            limit_mm = way.path.deepest().1.min(deepest_mm);
+            limit_mm = (BEYOND_EVEN * way.path.deepest().1).min(deepest_mm);
         }
     }
     loop {
