@@ -38,6 +38,10 @@ pub trait Isochoric: Copy + Send + Sync + 'static {
     fn energy(&self, k: &Kinematics) -> f64;
     /// First Piola-Kirchhoff stress `dU/dF`, MPa.
     fn first_piola(&self, k: &Kinematics) -> Mat3;
+    /// Both, for a law that computes them from the same.
+    fn energy_and_first_piola(&self, k: &Kinematics) -> (f64, Mat3) {
+        (self.energy(k), self.first_piola(k))
+    }
     /// Tangent `d2U/dF2`, MPa, with major symmetry.
     fn tangent(&self, k: &Kinematics) -> Tensor4;
     /// Shear modulus at rest, MPa.

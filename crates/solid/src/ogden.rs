@@ -77,8 +77,9 @@ impl Ogden {
         for t in self.terms() {
             let z = t.alpha * y;
             let c = 2.0 * t.mu_mpa / t.alpha;
-            sum[0] += c / t.alpha * exp_remainder(z);
-            sum[1] += c * z.exp_m1();
+            let less_one = z.exp_m1();
+            sum[0] += c / t.alpha * exp_remainder(z, less_one);
+            sum[1] += c * less_one;
             sum[2] += c * t.alpha * z.exp();
         }
         sum
@@ -125,12 +126,14 @@ impl Ogden {
     }
 
     /// Principal frame of the deformation.
+    #[inline(always)]
     fn principal(&self, k: &Kinematics) -> Principal {
         let (strain, axes) = eigen::symmetric(&k.green_strain());
         // A stretch below 1e-8 is not told from 0 by its Green strain, -1/2; its logarithm
         // would be infinite. A NaN stays one.
         let told = |e: f64| if e < STRAIN_MIN { STRAIN_MIN } else { e };
-        let x = strain.map(|e| 0.5 * (2.0 * told(e)).ln_1p());
+        let strain = strain.map(told);
+        let x = strain.map(|e| 0.5 * (2.0 * e).ln_1p());
         let mean = k.j_minus_1.ln_1p() / 3.0;
         let y = x.map(|v| v - mean);
         let w = y.map(|v| self.everywhere(v));
@@ -139,6 +142,7 @@ impl Ogden {
         Principal {
             axes,
             x,
+            per_square: strain.map(|e| 1.0 / (1.0 + 2.0 * e)),
             y,
             energy: w[0][0] + w[1][0] + w[2][0],
             slope,
@@ -153,6 +157,8 @@ struct Principal {
     axes: Mat3,
     /// `ln lambda_a`.
     x: [f64; 3],
+    /// `1 / lambda_a^2`.
+    per_square: [f64; 3],
     /// `ln l_a`.
     y: [f64; 3],
     /// Energy density, MPa.
@@ -169,9 +175,17 @@ impl Principal {
         self.axes.map(|n| std::array::from_fn(|i| f[i][0] * n[0] + f[i][1] * n[1] + f[i][2] * n[2]))
     }
 
+    /// `P = F S`.
+    fn first_piola(&self, f: &Mat3) -> Mat3 {
+        let (s, f) = (self.second_piola(), self.pushed(f));
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| (0..3).map(|a| s[a] * f[a][i] * self.axes[a][j]).sum())
+        })
+    }
+
     /// Principal second Piola-Kirchhoff stress, `S_a = T_a / lambda_a^2`.
     fn second_piola(&self) -> [f64; 3] {
-        std::array::from_fn(|a| (-2.0 * self.x[a]).exp() * self.slope[a])
+        std::array::from_fn(|a| self.per_square[a] * self.slope[a])
     }
 
     /// `2 dS_a / dC_b`: with `dT_a/dx_b = sum_c P_ac w''_c P_cb`, `P = I - 1/3`.
@@ -183,20 +197,21 @@ impl Principal {
                 if a == b {
                     d -= 2.0 * self.slope[a];
                 }
-                (-2.0 * (self.x[a] + self.x[b])).exp() * d
+                self.per_square[a] * self.per_square[b] * d
             })
         })
     }
 
     /// `(S_b - S_a) / (C_b - C_a)`. With `d = x_b - x_a` and the mean `m` of `x` it is
-    /// `e^(-4 m) [ (T_b - T_a) cosh d / (2 sinh d) - (T_a + T_b) / 2 ]`, exact for `d = 0`
+    /// `e^(-4 m) [ (T_b - T_a) coth d - (T_a + T_b) ] / 2`, exact for `d = 0`
     /// too once `T_b - T_a` is written as a divided difference.
     fn shear_tangent(&self, law: &Ogden, a: usize, b: usize) -> f64 {
         let d = self.x[b] - self.x[a];
-        let ratio = if d == 0.0 { 1.0 } else { d / d.sinh() };
+        // d coth d.
+        let ratio = if d == 0.0 { 1.0 } else { d / d.tanh() };
         let secant = law.divided_difference(self.y[a], self.y[b]);
-        let m4 = -2.0 * (self.x[a] + self.x[b]);
-        m4.exp() * 0.5 * (secant * ratio * d.cosh() - (self.slope[a] + self.slope[b]))
+        let scale = 0.5 * self.per_square[a] * self.per_square[b];
+        scale * (secant * ratio - (self.slope[a] + self.slope[b]))
     }
 }
 
@@ -209,51 +224,54 @@ impl Isochoric for Ogden {
 
     /// `P = F S`, `S = sum_a S_a N_a (x) N_a`.
     fn first_piola(&self, k: &Kinematics) -> Mat3 {
+        self.principal(k).first_piola(&k.f)
+    }
+
+    #[inline(always)]
+    fn energy_and_first_piola(&self, k: &Kinematics) -> (f64, Mat3) {
         let p = self.principal(k);
-        let (s, f) = (p.second_piola(), p.pushed(&k.f));
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| (0..3).map(|a| s[a] * f[a][i] * p.axes[a][j]).sum())
-        })
+        (p.energy, p.first_piola(&k.f))
     }
 
     /// `A_iJkL = delta_ik S_JL + F_iM C_MJNL F_kN` with the spectral form of `C`
-    /// (Holzapfel 2000, eq. 6.180).
+    /// (Holzapfel 2000, eq. 6.180). Of the dyads `D_ab = F N_a (x) N_b` the second part is
+    /// `sum_ab n_ab D_aa (x) D_bb + sum_(a < b) s_ab (D_ab + D_ba) (x) (D_ab + D_ba)`: six products.
+    #[inline(always)]
     fn tangent(&self, k: &Kinematics) -> Tensor4 {
         let p = self.principal(k);
         let (s, f, n) = (p.second_piola(), p.pushed(&k.f), &p.axes);
-        let normal = p.normal_tangent();
-        let mut t = [[[[0.0; 3]; 3]; 3]; 3];
-        let mut add = |factor: f64, [a, b, c, d]: [&[f64; 3]; 4]| {
-            for i in 0..3 {
-                for j in 0..3 {
-                    let left = factor * a[i] * b[j];
-                    for kk in 0..3 {
-                        for l in 0..3 {
-                            t[i][j][kk][l] += left * c[kk] * d[l];
-                        }
-                    }
-                }
+        let dyad = |a: usize, b: usize| -> [f64; 9] {
+            std::array::from_fn(|ij| f[a][ij / 3] * n[b][ij % 3])
+        };
+        let own = [dyad(0, 0), dyad(1, 1), dyad(2, 2)];
+        let mut t = [[0.0; 9]; 9];
+        let mut add = |left: &[f64; 9], right: &[f64; 9]| {
+            for (row, l) in t.iter_mut().zip(left) {
+                row.iter_mut().zip(right).for_each(|(t, r)| *t += l * r);
             }
         };
-        for a in 0..3 {
-            for b in 0..3 {
-                add(normal[a][b], [&f[a], &n[a], &f[b], &n[b]]);
-                if a != b {
-                    let shear = p.shear_tangent(self, a.min(b), a.max(b));
-                    add(shear, [&f[a], &n[b], &f[a], &n[b]]);
-                    add(shear, [&f[a], &n[b], &f[b], &n[a]]);
-                }
-            }
+        for (own_a, [x, y, z]) in own.iter().zip(p.normal_tangent()) {
+            let right = std::array::from_fn(|i| x * own[0][i] + y * own[1][i] + z * own[2][i]);
+            add(own_a, &right);
         }
-        for j in 0..3 {
-            for l in 0..3 {
-                let stress: f64 = (0..3).map(|a| s[a] * n[a][j] * n[a][l]).sum();
-                for i in 0..3 {
-                    t[i][j][i][l] += stress;
-                }
-            }
+        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+            let (ab, ba) = (dyad(a, b), dyad(b, a));
+            let both: [f64; 9] = std::array::from_fn(|i| ab[i] + ba[i]);
+            let shear = p.shear_tangent(self, a, b);
+            add(&both, &both.map(|v| shear * v));
         }
-        t
+        let stress = |j: usize, l: usize| (0..3).map(|a| s[a] * n[a][j] * n[a][l]).sum::<f64>();
+        let second: Mat3 = std::array::from_fn(|j| std::array::from_fn(|l| stress(j, l)));
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                std::array::from_fn(|kk| {
+                    std::array::from_fn(|l| {
+                        let geometric = if i == kk { second[j][l] } else { 0.0 };
+                        t[3 * i + j][3 * kk + l] + geometric
+                    })
+                })
+            })
+        })
     }
 
     /// `mu0 = sum mu_p`.
@@ -266,8 +284,8 @@ impl Isochoric for Ogden {
     }
 }
 
-/// `e^z - 1 - z` without cancellation near `z = 0`.
-fn exp_remainder(z: f64) -> f64 {
+/// `e^z - 1 - z` without cancellation near `z = 0`, of `z` and `e^z - 1`.
+fn exp_remainder(z: f64, less_one: f64) -> f64 {
     if z.abs() < 0.1 {
         // Taylor series; the first term left out is below 1e-19 of the sum.
         let mut term = 0.5 * z * z;
@@ -278,7 +296,7 @@ fn exp_remainder(z: f64) -> f64 {
         }
         sum
     } else {
-        z.exp_m1() - z
+        less_one - z
     }
 }
 

@@ -125,12 +125,10 @@ fn packed(m: &Mat3) -> [f64; 6] {
     [m[0][0], m[1][1], m[2][2], m[0][1], m[1][2], m[0][2]]
 }
 
-impl<L: Isochoric> Isochoric for Relaxing<L> {
-    const FINITE: bool = L::FINITE;
-
-    /// `c U + B : (Cbar - I) / 2`; of small strain `c U + B : dev e`.
-    fn energy(&self, k: &Kinematics) -> f64 {
-        let branches = if L::FINITE {
+impl<L: Isochoric> Relaxing<L> {
+    /// Energy density of the branches, MPa.
+    fn branches_energy(&self, k: &Kinematics) -> f64 {
+        if L::FINITE {
             // Cbar - I = J^(-2/3) (2 E - (J^(2/3) - 1) I).
             let (m, e) = (k.j_pow_minus_two_thirds(), k.green_strain());
             let grown = (2.0 / 3.0 * k.j_minus_1.ln_1p()).exp_m1();
@@ -138,13 +136,11 @@ impl<L: Isochoric> Isochoric for Relaxing<L> {
             m * (double_dot(&self.pull, &e) - 0.5 * grown * trace)
         } else {
             double_dot(&self.pull, &deviatoric_strain(&k.h))
-        };
-        self.scale * self.law.energy(k) + branches
+        }
     }
 
-    /// `P = c P_L + J^(-2/3) (F B - 1/3 (F B : F) F^-T)`.
-    fn first_piola(&self, k: &Kinematics) -> Mat3 {
-        let elastic = self.law.first_piola(k);
+    /// First Piola-Kirchhoff stress of the law and the branches, MPa.
+    fn with_branches(&self, elastic: &Mat3, k: &Kinematics) -> Mat3 {
         let branches = if L::FINITE {
             let fb = product(&k.f, &self.pull);
             let third = double_dot(&fb, &k.f) / 3.0;
@@ -161,6 +157,25 @@ impl<L: Isochoric> Isochoric for Relaxing<L> {
         std::array::from_fn(|i| {
             std::array::from_fn(|j| self.scale * elastic[i][j] + branches[i][j])
         })
+    }
+}
+
+impl<L: Isochoric> Isochoric for Relaxing<L> {
+    const FINITE: bool = L::FINITE;
+
+    /// `c U + B : (Cbar - I) / 2`; of small strain `c U + B : dev e`.
+    fn energy(&self, k: &Kinematics) -> f64 {
+        self.scale * self.law.energy(k) + self.branches_energy(k)
+    }
+
+    /// `P = c P_L + J^(-2/3) (F B - 1/3 (F B : F) F^-T)`.
+    fn first_piola(&self, k: &Kinematics) -> Mat3 {
+        self.with_branches(&self.law.first_piola(k), k)
+    }
+
+    fn energy_and_first_piola(&self, k: &Kinematics) -> (f64, Mat3) {
+        let (energy, elastic) = self.law.energy_and_first_piola(k);
+        (self.scale * energy + self.branches_energy(k), self.with_branches(&elastic, k))
     }
 
     fn tangent(&self, k: &Kinematics) -> Tensor4 {

@@ -122,8 +122,9 @@ pub fn evaluate<P: Points>(
         let gradients = &geometry.gradients[q * n..(q + 1) * n];
         let weight = geometry.weights[q];
         let law = law.at(q);
-        energy += weight * law.energy(k);
-        add_times(force, weight, &law.first_piola(k), gradients);
+        let (density, stress) = law.energy_and_first_piola(k);
+        energy += weight * density;
+        add_times(force, weight, &stress, gradients);
         if let Some(s) = stiffness.as_deref_mut() {
             let pressure = bulk * at_point(&held, q);
             add_point_stiffness(s, &point_tangent(&law, k, pressure, weight), gradients);

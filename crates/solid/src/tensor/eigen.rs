@@ -10,6 +10,7 @@ const SWEEPS_MAX: u32 = 12;
 /// Jacobi's method: accurate to rounding of the largest entry, also for repeated
 /// and nearly equal eigenvalues, where closed forms lose half the digits.
 #[must_use]
+#[inline(always)]
 pub fn symmetric(m: &Mat3) -> ([f64; 3], Mat3) {
     let mut a = *m;
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -25,6 +26,7 @@ pub fn symmetric(m: &Mat3) -> ([f64; 3], Mat3) {
 }
 
 /// Annihilates `a[p][q]` (Golub & Van Loan, 8.5.2).
+#[inline(always)]
 fn rotate(a: &mut Mat3, v: &mut Mat3, p: usize, q: usize) {
     let off = a[p][q];
     // Below rounding of the diagonal it changes nothing.
