@@ -53,6 +53,13 @@ pub(crate) fn read(
     })
 }
 
+/// Whether skin is pressed that lies, in the undeformed finger, further from the tip than `from_mm`.
+pub(crate) fn reaches(body: &Body, solver: &Solver<'_>, from_mm: f64) -> bool {
+    let mesh = &body.problem.mesh;
+    let pressure = solver.pressure_mpa(&mesh.surfaces[&body.contact]);
+    mesh.nodes.iter().zip(&pressure).any(|(at, p)| at[0] > from_mm && *p > 0.0)
+}
+
 /// Midpoints of the squares of a face, with their weights.
 fn middles() -> Vec<([f64; 2], f64)> {
     let width = 2.0 / PARTS as f64;

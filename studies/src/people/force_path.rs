@@ -21,6 +21,12 @@ impl ForcePath {
         self.force_n.push(force_n);
     }
 
+    /// Takes the last state back.
+    pub(crate) fn pop(&mut self) {
+        self.depth_mm.pop();
+        self.force_n.pop();
+    }
+
     /// The largest force, N, and the depth there, mm; zeros of an empty path.
     #[must_use]
     pub fn deepest(&self) -> (f64, f64) {

@@ -96,6 +96,10 @@ pub(crate) struct Press {
     pub subject: Subject,
 }
 
+/// Greatest side of a plate, mm.
+const PLATE_MM: f64 = 30.0;
+/// How far before the end of the model a plate ends, mm.
+const PLATE_ENDS_MM: f64 = 1.5;
 /// Length of a cylinder, mm: it is longer than any finger is wide.
 const CYLINDER_MM: f64 = 40.0;
 
@@ -117,9 +121,21 @@ impl Cells {
 }
 
 impl Press {
-    /// A plate that is inclined tip first.
+    /// A plate that is inclined tip first. It ends before the model does, which is about where people's
+    /// fingers have the crease of the joint: what lies behind is not pressed by those who measure pads, and
+    /// the cut there would bear half of 10 N.
     pub(crate) fn plate(pitch_deg: f64, subject: Subject) -> Self {
-        let indenter = IndenterSpec::Plate(Plate { size_mm: [30.0, 30.0], ..Plate::default() });
+        let whole = Self::whole_plate(pitch_deg, subject);
+        let Ok(touch) = whole.first_touch(&[1.0]) else { return whole };
+        let along_mm = whole.subject.shape.length_mm - PLATE_ENDS_MM - touch.first[0];
+        let half_mm = (along_mm / pitch_deg.to_radians().cos()).clamp(1.0, 0.5 * PLATE_MM);
+        let size_mm = [2.0 * half_mm, PLATE_MM];
+        Self { indenter: IndenterSpec::Plate(Plate { size_mm, ..Plate::default() }), ..whole }
+    }
+
+    fn whole_plate(pitch_deg: f64, subject: Subject) -> Self {
+        let size_mm = [PLATE_MM, PLATE_MM];
+        let indenter = IndenterSpec::Plate(Plate { size_mm, ..Plate::default() });
         let name = format!("plate-{pitch_deg}");
         Self { name, indenter, pitch_deg, yaw_deg: 0.0, subject }
     }

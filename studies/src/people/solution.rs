@@ -26,7 +26,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Changes what is read of a state: files of other readings are solved again.
-const READING: u32 = 1;
+const READING: u32 = 2;
 
 /// One stored state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -161,6 +161,7 @@ impl Solution {
         let rest_mm3 = body.problem.volume_mm3(&vec![[0.0; 3]; body.problem.mesh.nodes.len()]);
         let rotation = touch.start.rotation;
         let force = Cell::new(0.0);
+        let at_end = Cell::new(false);
         let mut broken = None;
         let path = &mut self.path;
         let mut keep = |k: usize, solver: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
@@ -168,6 +169,7 @@ impl Solution {
                 *path = ForcePath::default();
             }
             force.set(solver.force_along_path_n());
+            at_end.set(contact::reaches(&body, solver, finger.length_mm - END_MM));
             path.push(record.depth_mm, force.get());
             let felt = reader.felt(solver, record).unwrap_or_else(|e| {
                 broken = Some(e.to_string());
@@ -182,10 +184,11 @@ impl Solution {
                 energy_vs_work: record.checks.energy_vs_work,
             }
         };
-        let mut at_state = |_: &AtState<'_, State>| match force.get() >= course.until_n {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        };
+        let mut at_state =
+            |_: &AtState<'_, State>| match force.get() >= course.until_n || at_end.get() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            };
         let stoppable = Stoppable { from: None, at_state: &mut at_state };
         let mut solver = body.solver(Options::default()).map_err(failed)?;
         let (approach, drive) = (press.approach()?, Drive::Depths(course.depths_mm.clone()));
@@ -193,6 +196,13 @@ impl Solution {
         let pressed =
             body.press_stoppable(&mut solver, &approach, &drive, limit, &mut keep, stoppable);
         self.states = pressed.kept;
+        if at_end.get() {
+            self.states.pop();
+            self.path.pop();
+            broken = Some(format!(
+                "the contact comes within {END_MM} mm of where the model of the finger ends"
+            ));
+        }
         if self.states.is_empty() {
             self.path = ForcePath::default();
         }
@@ -209,6 +219,10 @@ impl Solution {
         self.states.iter().map(|s| s.energy_vs_work).fold(0.0, f64::max)
     }
 }
+
+/// A contact that comes so near to the plane where the finger is cut off leans on the cut, mm: people's
+/// fingers go on there, and the model is held.
+const END_MM: f64 = 0.5;
 
 /// The finger, its cells, if any are split, for the very depths that are stored.
 fn body(
@@ -230,7 +244,7 @@ const LIMIT_SPLIT_MM: f64 = 4.25;
 const LIMIT_EVEN_MM: f64 = 5.25;
 /// How much deeper than the even mesh says a press on a split one may go, and how much deeper again if
 /// that is not enough.
-const BEYOND_EVEN: f64 = 1.15;
+const BEYOND_EVEN: f64 = 1.04;
 /// How much deeper than Hertz' guess a press may go at first.
 const BEYOND_GUESS: f64 = 1.25;
 
@@ -249,7 +263,7 @@ pub(crate) fn until(
     let mut limit_mm = (BEYOND_GUESS * press.hertz_depth_mm(until_n)?).min(deepest_mm);
     if is_split {
         let way = until(press, until_n, Cells::COARSE, reads, folder)?;
-        if way.path.reaches(until_n) {
+        if way.path.reaches(until_n) || way.ended.is_some() {
             limit_mm = (BEYOND_EVEN * way.path.deepest().1).min(deepest_mm);
         }
     }
@@ -307,4 +321,32 @@ pub(crate) fn held_at(
         depth_mm,
         why,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::people::press::Materials;
+    use papilla_sdf::{IndenterSpec, Plate};
+
+    /// A pad that hardly rises towards the joint lies on a plate as far as the model goes: what presses
+    /// there tells of the cut, not of a finger.
+    #[test]
+    fn a_press_ends_before_its_contact_leans_on_the_end_of_the_model() {
+        let folder = tempfile::tempdir().unwrap();
+        let pressed = |crease_depth_mm: f64| {
+            let mut subject = Materials::NeoHookean.subject();
+            subject.shape.crease_depth_mm = crease_depth_mm;
+            let indenter = IndenterSpec::Plate(Plate { size_mm: [30.0, 30.0], ..Plate::default() });
+            let press = Press { indenter, ..Press::plate(0.0, subject) };
+            let course = Course::until(1e3, Cells::COARSE, Reads::Force, 1.2);
+            Solution::found_or_solved(&press, &course, folder.path()).unwrap()
+        };
+        let usual = pressed(FingertipShape::default().crease_depth_mm);
+        assert_eq!((usual.states.len(), usual.ended.as_deref()), (6, None));
+        let flat = pressed(0.1);
+        assert!(flat.states.len() < 6, "{:?}", flat.path);
+        assert_eq!(flat.states.len(), flat.path.force_n.len());
+        assert!(flat.ended.unwrap().contains("the model of the finger ends"));
+    }
 }
