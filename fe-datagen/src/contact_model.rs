@@ -8,7 +8,7 @@ use papilla_dataset::{Dataset, Field, Maps, Shard, Split};
 use papilla_fingertip::geometry::fingertip::{FingertipShape, SurfaceParameter};
 use papilla_fingertip::influence::{self, Compliance, Load, SecondOrder};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
-use papilla_fingertip::scene::{EffectName, Finger, TissueTable};
+use papilla_fingertip::scene::{Finger, TissueTable};
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::tissue::Tissue;
 use papilla_vector::norm;
@@ -105,8 +105,8 @@ pub(crate) fn make(
         atlas_hash: compliance.atlas_hash.clone(),
         effects: ["finite_strain", "layers"]
             .into_iter()
-            .chain(tissue.needs.iter().map(EffectName::as_str))
-            .map(Into::into)
+            .map(String::from)
+            .chain(tissue.needs.iter().cloned())
             .collect(),
         datasets,
         vertices,

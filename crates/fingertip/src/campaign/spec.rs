@@ -218,7 +218,8 @@ impl CampaignSpec {
             self.materials = found.tissue;
         }
         if !has_key(text, "effects") {
-            self.effects.extend(&self.materials.needs);
+            let needs = &self.materials.needs;
+            self.effects.extend(needs.iter().filter_map(|name| EffectName::named(name)));
         }
         self.finger_sha256 = Some(sha256_of(&found.shape, &self.materials));
         self.shape = found.shape;

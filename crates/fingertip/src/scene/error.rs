@@ -72,7 +72,7 @@ pub enum SceneError {
     )]
     Unnamed {
         /// The effect.
-        effect: &'static str,
+        effect: String,
     },
     /// A material out of range.
     #[error(transparent)]

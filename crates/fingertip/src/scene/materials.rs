@@ -1,6 +1,5 @@
 //! The table `[materials]` of a scene: the constants of each tissue.
 
-use super::effects::EffectName;
 use crate::materials::{MaterialError, MaterialSpec, Moduli, OgdenSpec, PronySpec};
 use crate::tissue::Tissue;
 use papilla_solid::Isochoric as _;
@@ -17,7 +16,7 @@ pub struct TissueTable {
     /// Effects with which the constants were fitted. A scene has to name them: without them the
     /// constants would mean another finger.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub needs: Vec<EffectName>,
+    pub needs: Vec<String>,
     /// Epidermis.
     pub epidermis: MaterialSpec,
     /// Dermis.
@@ -53,7 +52,7 @@ struct Given {
     skin_tension_n_per_mm: Option<f64>,
     /// Effects with which the constants were fitted, and which a scene therefore has to name [those of
     /// the set].
-    needs: Option<Vec<EffectName>>,
+    needs: Option<Vec<String>>,
     /// Epidermis.
     epidermis: Option<MaterialSpec>,
     /// Dermis.
@@ -108,7 +107,7 @@ impl MaterialSet {
             Self::Papers => papers,
             Self::People => {
                 let [epidermis, dermis, subcutaneous] = people();
-                let needs = EffectName::named("hyperelastic").into_iter().collect();
+                let needs = vec!["hyperelastic".into()];
                 TissueTable { needs, epidermis, dermis, subcutaneous, ..papers }
             }
         }
@@ -175,7 +174,7 @@ impl TissueTable {
     /// Whether the constants were fitted with the effect of this name.
     #[must_use]
     pub fn needs(&self, effect: &str) -> bool {
-        self.needs.iter().any(|e| e.as_str() == effect)
+        self.needs.iter().any(|e| e == effect)
     }
 
     /// Checks every entry, used or not.

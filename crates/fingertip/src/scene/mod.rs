@@ -181,7 +181,8 @@ impl Scene {
         }
         self.take_finger()?;
         if !self.origin.has("effects") {
-            self.effects.extend(&self.materials.needs);
+            let known = self.materials.needs.iter().filter_map(|name| EffectName::named(name));
+            self.effects.extend(known);
         }
         self.take_meshes()?;
         self.validate()?;
@@ -248,6 +249,10 @@ impl Scene {
             });
         }
         self.materials.validate()?;
+        for name in &self.materials.needs {
+            let rule = "is no effect: `fe-datagen explain` lists them";
+            require(EffectName::named(name).is_some(), "materials.needs", name, rule)?;
+        }
         self.validate_tension()?;
         if self.has("biphasic") {
             self.biphasic.validate(&self.materials)?;

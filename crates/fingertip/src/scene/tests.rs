@@ -54,7 +54,11 @@ fn effects_with_which_tissues_were_fitted_are_taken_or_asked_for() {
     assert_refused(&[
         (format!("{own}{FINGER}{people}"), 1, &["'hyperelastic' is missing", "`needs`"]),
         (format!("{own}{FINGER}{needs}"), 1, &["'hyperelastic' is missing"]),
-        (format!("{FINGER}[materials]\nneeds = [\"elastic\"]\n"), 8, &["unknown effect 'elastic'"]),
+        (
+            format!("{FINGER}[materials]\nneeds = [\"elastic\"]\n"),
+            8,
+            &["needs = \"elastic\" is no effect"],
+        ),
     ]);
 }
 

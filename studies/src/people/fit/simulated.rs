@@ -5,7 +5,7 @@ use super::parameters::{Moved, shape, table};
 use crate::people::PeopleError;
 use crate::people::press::{Cells, Subject};
 use papilla_fingertip::mesh::fingertip::Density;
-use papilla_fingertip::scene::{EffectName, Finger, TissueTable};
+use papilla_fingertip::scene::{Finger, TissueTable};
 use std::path::Path;
 
 /// Simulates points of the unit box, and counts.
@@ -30,7 +30,7 @@ pub(crate) fn subject(moved: &Moved, at: &[f64]) -> Subject {
 /// The same as a finger's file has it.
 pub(crate) fn finger(subject: &Subject) -> Finger {
     // The constants are of Ogden's law: without it they would be another finger's.
-    let needs = subject.hyperelastic.then(|| EffectName::named("hyperelastic")).flatten();
+    let needs = subject.hyperelastic.then(|| "hyperelastic".to_owned());
     let tissue = TissueTable { needs: needs.into_iter().collect(), ..subject.table.clone() };
     Finger { shape: subject.shape.clone(), tissue, ..Finger::usual() }
 }

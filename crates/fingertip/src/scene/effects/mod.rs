@@ -117,8 +117,8 @@ impl Plan {
     /// [`SceneError::Effect`] for an effect that the scene cannot have, or that
     /// lacks another one; [`SceneError::Unnamed`] for one that its tissues need.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        if let Some(missing) = scene.materials.needs.iter().find(|e| !scene.has(e.as_str())) {
-            return Err(SceneError::Unnamed { effect: missing.as_str() });
+        if let Some(missing) = scene.materials.needs.iter().find(|e| !scene.has(e)) {
+            return Err(SceneError::Unnamed { effect: missing.clone() });
         }
         let mut plan = Self::bare();
         for effect in EFFECTS.iter().filter(|e| scene.has(e.name)) {

@@ -3,7 +3,6 @@
 use super::{FIELDS, Finger, SKIN_FILE};
 use crate::geometry::fingertip::{FingertipShape, LayerMap, SkinOffset, SurfaceParameter};
 use crate::materials::MaterialSpec;
-use crate::scene::effects::EffectName;
 use crate::scene::materials::{MaterialSet, TissueTable};
 use crate::tissue::Tissue;
 use serde::{Deserialize, Serialize};
@@ -250,10 +249,10 @@ fn tissue(table: &TissueTable) -> String {
             &format!("# Tension of the skin at rest, N/mm.\nskin_tension_n_per_mm = {tension:?}\n");
     }
     if table.needs != needs {
-        let names: Vec<&str> = table.needs.iter().map(EffectName::as_str).collect();
         text += &format!(
             "# Effects with which these constants were fitted: whoever presses the finger has to name them.\n\
-             needs = {names:?}\n"
+             needs = {:?}\n",
+            table.needs
         );
     }
     for (tissue, spec) in own {

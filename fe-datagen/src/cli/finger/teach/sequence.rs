@@ -4,7 +4,7 @@ use papilla_fingertip::campaign::{CampaignSpec, DepthRange};
 use papilla_fingertip::geometry::fingertip::{
     FingertipShape, FingertipShapeError, SurfaceParameter,
 };
-use papilla_fingertip::scene::Finger;
+use papilla_fingertip::scene::{EffectName, Finger};
 use papilla_vector::{minus, norm};
 use std::path::{Path, PathBuf};
 
@@ -53,7 +53,8 @@ impl Sequence {
             None => CampaignSpec::parse(Path::new("campaigns/teach.toml"), SEQUENCE),
         }?;
         let named = template.effects.clone();
-        template.effects.extend(finger.tissue.needs.iter().filter(|e| !named.contains(e)));
+        let needs = finger.tissue.needs.iter().filter_map(|name| EffectName::named(name));
+        template.effects.extend(needs.filter(|e| !named.contains(e)));
         Ok(Self { template, scale: Scale::of(&finger.shape)? })
     }
 
