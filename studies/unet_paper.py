@@ -79,8 +79,7 @@ class Run:
             sys.exit(f"error: no run {name!r}: NETWORK/SPLIT, of {', '.join(NETWORKS)} and {', '.join(SPLITS)}")
         self.name, self.network, self.split = name, network, split
         self.folder = out / network / split
-        self.published = network.startswith("s1-")
-        self.precision = precision
+        self.precision = precision if network.startswith("s1-") else "f32"
 
     def checkpoint(self):
         """The last checkpoint, none if nothing was trained yet."""
@@ -95,8 +94,7 @@ def processor_seconds(state):
 
 
 def settings(run, epochs):
-    precision = run.precision if run.published else "f32"
-    given = {**NETWORKS[run.network], "precision": precision, "epochs": epochs}
+    given = {**NETWORKS[run.network], "precision": run.precision, "epochs": epochs}
     return TrainConfig(**given, seed=SEED, validation_presses=0, threads=1, device="cpu")
 
 

@@ -22,7 +22,8 @@ pub(super) struct Args {
     /// Mesh of the spheres' states, cells split where they touch.
     #[arg(long, value_enum, default_value_t = choices::Density::Medium)]
     density: choices::Density,
-    /// Laws and constants of the tissues; with `--finger` the laws that take its constants, unless its file says that they need Ogden's.
+    /// Laws and constants of the tissues; with `--finger` the laws that take its constants, unless its file says
+    /// that they need Ogden's.
     #[arg(long, value_enum, default_value_t = Materials::NeoHookean)]
     materials: Materials,
     /// A finger of your own: its folder, its finger.toml, or its name in fingers/.

@@ -123,7 +123,7 @@ impl Cells {
 impl Press {
     /// A plate that is inclined tip first. It ends before the model does, which is about where people's
     /// fingers have the crease of the joint: what lies behind is not pressed by those who measure pads, and
-    /// the cut there would bear half of 10 N.
+    /// under a flat pad the cut there would bear half of 4 N.
     pub(crate) fn plate(pitch_deg: f64, subject: Subject) -> Self {
         let whole = Self::whole_plate(pitch_deg, subject);
         let Ok(touch) = whole.first_touch(&[1.0]) else { return whole };

@@ -4,7 +4,7 @@ use super::error::SpecError;
 use crate::geometry::fingertip::FingertipShape;
 use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, Order};
-use crate::scene::effects::usual;
+use crate::scene::effects::{add_needed, usual};
 use crate::scene::finger::sha256_of;
 use crate::scene::has_key;
 use crate::scene::{
@@ -191,6 +191,9 @@ impl CampaignSpec {
             campaign: spec.name.clone(),
             source: Box::new(source),
         })?;
+        if !has_key(text, "effects") {
+            add_needed(&mut spec.effects, &spec.materials);
+        }
         spec.validate()?;
         spec.take_meshes()?;
         Ok(spec)
@@ -216,10 +219,6 @@ impl CampaignSpec {
         let found = Finger::find(name, &self.folder)?;
         if !has_key(text, "materials") {
             self.materials = found.tissue;
-        }
-        if !has_key(text, "effects") {
-            let needs = &self.materials.needs;
-            self.effects.extend(needs.iter().filter_map(|name| EffectName::named(name)));
         }
         self.finger_sha256 = Some(sha256_of(&found.shape, &self.materials));
         self.shape = found.shape;

@@ -181,8 +181,7 @@ impl Scene {
         }
         self.take_finger()?;
         if !self.origin.has("effects") {
-            let known = self.materials.needs.iter().filter_map(|name| EffectName::named(name));
-            self.effects.extend(known);
+            effects::add_needed(&mut self.effects, &self.materials);
         }
         self.take_meshes()?;
         self.validate()?;

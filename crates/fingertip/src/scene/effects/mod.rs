@@ -16,7 +16,7 @@ mod plane_strain;
 mod viscoelastic;
 
 use super::biphasic::SkinFlow;
-use super::{Scene, SceneError};
+use super::{Scene, SceneError, TissueTable};
 use crate::mesh::fingertip::Parts;
 use crate::scene::Census;
 use crate::tissue::Tissue;
@@ -188,6 +188,16 @@ impl From<EffectName> for String {
 pub fn usual() -> Vec<EffectName> {
     let of = |e: &Effect| EFFECTS.iter().position(|known| known.name == e.name).map(EffectName);
     [&finite_strain::EFFECT, &layers::EFFECT].into_iter().filter_map(of).collect()
+}
+
+/// Adds the effects that constants of tissues need and that `effects` lacks. Names of no effect are left
+/// to [`Scene::validate`].
+pub fn add_needed(effects: &mut Vec<EffectName>, tissues: &TissueTable) {
+    for needed in tissues.needs.iter().filter_map(|name| EffectName::named(name)) {
+        if !effects.contains(&needed) {
+            effects.push(needed);
+        }
+    }
 }
 
 /// For an effect that every scene can have.

@@ -239,16 +239,16 @@ fn tissue(table: &TissueTable) -> String {
         own.filter(|(t, spec)| *spec != usual.of(*t)).collect()
     };
     let (papers, people) = (differing(MaterialSet::Papers), differing(MaterialSet::People));
-    let (name, own, needs) = match people.len() < papers.len() {
-        true => ("people", people, MaterialSet::People.table().needs),
-        false => ("papers", papers, MaterialSet::Papers.table().needs),
+    let (name, set, own) = match people.len() < papers.len() {
+        true => ("people", MaterialSet::People, people),
+        false => ("papers", MaterialSet::Papers, papers),
     };
     let mut text = format!("[tissue]\nset = \"{name}\"\n");
     if let Some(tension) = table.skin_tension_n_per_mm {
         text +=
             &format!("# Tension of the skin at rest, N/mm.\nskin_tension_n_per_mm = {tension:?}\n");
     }
-    if table.needs != needs {
+    if table.needs != set.table().needs {
         text += &format!(
             "# Effects with which these constants were fitted: whoever presses the finger has to name them.\n\
              needs = {:?}\n",

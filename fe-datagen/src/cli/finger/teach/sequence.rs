@@ -4,7 +4,8 @@ use papilla_fingertip::campaign::{CampaignSpec, DepthRange};
 use papilla_fingertip::geometry::fingertip::{
     FingertipShape, FingertipShapeError, SurfaceParameter,
 };
-use papilla_fingertip::scene::{EffectName, Finger};
+use papilla_fingertip::scene::Finger;
+use papilla_fingertip::scene::effects::add_needed;
 use papilla_vector::{minus, norm};
 use std::path::{Path, PathBuf};
 
@@ -52,9 +53,7 @@ impl Sequence {
             Some(file) => CampaignSpec::read(file),
             None => CampaignSpec::parse(Path::new("campaigns/teach.toml"), SEQUENCE),
         }?;
-        let named = template.effects.clone();
-        let needs = finger.tissue.needs.iter().filter_map(|name| EffectName::named(name));
-        template.effects.extend(needs.filter(|e| !named.contains(e)));
+        add_needed(&mut template.effects, &finger.tissue);
         Ok(Self { template, scale: Scale::of(&finger.shape)? })
     }
 
